@@ -1,0 +1,3 @@
+//! Dispatcher, node, ledger and film: state machines and pure functions.
+#![no_std]
+#![forbid(unsafe_code)]

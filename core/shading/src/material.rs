@@ -1,0 +1,82 @@
+//! Materials: Whitted's model as OBJ/MTL and NFF can say it.
+
+use bytemuck::{Pod, Zeroable};
+
+/// How a highlight falls off around the mirror direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Highlight {
+    /// No highlight.
+    #[default]
+    None = 0,
+    /// `cos^n` of the angle between the mirrored view and the light (Phong; NFF).
+    Phong = 1,
+    /// `cos^n` of the angle between the normal and the half vector (Blinn; MTL).
+    Blinn = 2,
+}
+
+/// A material as a node's table holds it. Colours are linear, 0 and up.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Material {
+    /// Diffuse reflectance: what a light of unit irradiance at normal incidence shows.
+    pub diffuse: [f32; 3],
+    /// Reflectance of the scene's ambient light.
+    pub ambient: [f32; 3],
+    /// Radiance that the surface sends out by itself.
+    pub emission: [f32; 3],
+    /// Strength of the highlight of each light.
+    pub specular: [f32; 3],
+    /// Weight of the mirrored ray.
+    pub mirror: [f32; 3],
+    /// Weight of the refracted ray; also what a shadow ray keeps when it passes through.
+    pub transmission: [f32; 3],
+    /// Exponent of the highlight, 0 and up.
+    pub exponent: f32,
+    /// Index of refraction of the inside, more than 0.
+    pub ior: f32,
+    /// [`Highlight`] as a number.
+    pub highlight: u32,
+    /// [`Material::FRESNEL`] and the like.
+    pub flags: u32,
+}
+
+const _: () = assert!(core::mem::size_of::<Material>() == 88);
+
+impl Material {
+    /// Mirror and refracted ray share the light by Fresnel's equations (dielectric): the mirrored ray gains what
+    /// the refracted one loses.
+    pub const FRESNEL: u32 = 1;
+
+    /// Matt grey of reflectance 0.75 (without highlight, mirror or transmission).
+    pub const MATT: Self = Self {
+        diffuse: [0.75; 3],
+        ambient: [0.0; 3],
+        emission: [0.0; 3],
+        specular: [0.0; 3],
+        mirror: [0.0; 3],
+        transmission: [0.0; 3],
+        exponent: 0.0,
+        ior: 1.0,
+        highlight: Highlight::None as u32,
+        flags: 0,
+    };
+
+    /// Whether light passes through.
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        self.transmission.iter().any(|&c| c > 0.0)
+    }
+
+    /// Whether it spawns mirrored rays.
+    #[must_use]
+    pub fn mirrors(&self) -> bool {
+        self.mirror.iter().any(|&c| c > 0.0) || (self.flags & Self::FRESNEL != 0 && self.transmits())
+    }
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self::MATT
+    }
+}

@@ -1,0 +1,3 @@
+//! Messages and ray records, byte by byte.
+#![no_std]
+#![forbid(unsafe_code)]

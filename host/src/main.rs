@@ -1,0 +1,3 @@
+//! The `hybray` program.
+#![forbid(unsafe_code)]
+fn main() {}

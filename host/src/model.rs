@@ -1,0 +1,155 @@
+//! What an importer makes of a file: primitives, materials, lights and cameras, before any tree is built.
+//!
+//! Coordinates are the file's own, in `f32`. Primitive ids follow from the order here: the triangles of each mesh in
+//! turn, then spheres, then cones.
+
+use hybray_shading::{Light, Material};
+
+/// Triangles that share a material and whether they have vertex normals.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// What the file calls it; used in messages.
+    pub name: String,
+    /// Vertices.
+    pub positions: Vec<[f32; 3]>,
+    /// Empty, or one unit normal for each vertex.
+    pub normals: Vec<[f32; 3]>,
+    /// Vertex indices, counterclockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Model::materials`].
+    pub material: u16,
+}
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub centre: [f32; 3],
+    /// Radius, more than 0.
+    pub radius: f32,
+    /// Index into [`Model::materials`].
+    pub material: u16,
+}
+
+/// NFF's open cone or cylinder (equal radii): no caps, seen from both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Centre of the base.
+    pub base: [f32; 3],
+    /// Radius there, 0 or more.
+    pub base_radius: f32,
+    /// Centre of the other end, not equal to `base`.
+    pub apex: [f32; 3],
+    /// Radius there, 0 or more; not both radii are 0.
+    pub apex_radius: f32,
+    /// Index into [`Model::materials`].
+    pub material: u16,
+}
+
+/// A material with the name that its file gives it.
+#[derive(Clone, Debug, Default)]
+pub struct NamedMaterial {
+    /// Name, or empty.
+    pub name: String,
+    /// What a node holds of it.
+    pub material: Material,
+}
+
+/// A pinhole camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraSpec {
+    /// For `--camera NAME`.
+    pub name: String,
+    /// Where the eye is.
+    pub eye: [f32; 3],
+    /// What it looks at; not equal to `eye`.
+    pub target: [f32; 3],
+    /// Up, not along the view.
+    pub up: [f32; 3],
+    /// Angle between the top and the bottom edge of the picture, degrees, more than 0 and less than 180.
+    pub fov_y_degrees: f32,
+    /// Rays start at this distance along the view axis (NFF's hither); 0 to start at the eye.
+    pub hither: f32,
+    /// Picture size that the file asks for, in pixels.
+    pub size: Option<[u32; 2]>,
+}
+
+/// Objects as the file counts them: one polygon may become several triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Objects {
+    /// Polygons (triangles included) and polygonal patches.
+    pub polygons: u64,
+    /// Spheres.
+    pub spheres: u64,
+    /// Cones with unequal radii.
+    pub cones: u64,
+    /// Cones with equal radii.
+    pub cylinders: u64,
+}
+
+/// Settings that a scene file may give; the command line goes before them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Picture size, pixels.
+    pub size: Option<[u32; 2]>,
+    /// Samples a pixel.
+    pub spp: Option<u32>,
+    /// Ray depth: 1 is primary rays and their shadows only.
+    pub depth: Option<u32>,
+    /// A ray whose weight is below this in every channel is not traced.
+    pub cutoff: Option<f32>,
+    /// Pixel filter: `box`, `tent` or `gaussian`.
+    pub filter: Option<String>,
+    /// Radiance is multiplied by this before it is encoded.
+    pub exposure: Option<f32>,
+    /// Seed of every random choice.
+    pub seed: Option<u64>,
+}
+
+/// A scene as read, before anything is built from it.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// Triangles.
+    pub meshes: Vec<Mesh>,
+    /// Spheres.
+    pub spheres: Vec<Sphere>,
+    /// Cones and cylinders.
+    pub cones: Vec<Cone>,
+    /// At least one if there are primitives; at most 65,535.
+    pub materials: Vec<NamedMaterial>,
+    /// Lights; empty if the file has none (a default is then made).
+    pub lights: Vec<Light>,
+    /// Cameras; empty if the file has none (the model is then framed).
+    pub cameras: Vec<CameraSpec>,
+    /// Radiance where a ray meets nothing.
+    pub background: [f32; 3],
+    /// Ambient light, multiplied by each material's `ambient`.
+    pub ambient: [f32; 3],
+    /// Settings that the file gives.
+    pub settings: Settings,
+    /// What the file counts.
+    pub objects: Objects,
+    /// What could not be honoured, each one line for a person.
+    pub warnings: Vec<String>,
+}
+
+impl Model {
+    /// Triangles, spheres and cones together.
+    #[must_use]
+    pub fn primitives(&self) -> usize {
+        self.meshes.iter().map(|m| m.triangles.len()).sum::<usize>() + self.spheres.len() + self.cones.len()
+    }
+
+    /// Adds a material and returns its index; an equal one of the same name is used again.
+    ///
+    /// # Panics
+    /// If there are 65,535 already: importers check first.
+    pub fn add_material(&mut self, name: &str, material: Material) -> u16 {
+        let found = self.materials.iter().rposition(|m| m.name == name && m.material == material);
+        let index = found.unwrap_or_else(|| {
+            self.materials.push(NamedMaterial { name: name.to_owned(), material });
+            self.materials.len() - 1
+        });
+        u16::try_from(index).expect("at most 65,535 materials")
+    }
+}

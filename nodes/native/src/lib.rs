@@ -1,0 +1,2 @@
+//! Nodes as threads of this process.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! Whole-system tests: parity, faults, extremes, golden pictures.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! The link between threads of one process.
+#![forbid(unsafe_code)]
