@@ -1,3 +1,23 @@
-//! Page format, directory and what a scene requires.
+//! The page format, the directory, and what a scene requires.
+//!
+//! A **page** is a position-independent little-endian block of at most 64 KiB: a subtree of wide nodes and its
+//! primitives. It is read in place where it lands; [`PageView::parse`] validates it, once, on arrival. The
+//! **directory** is the top of the tree: wide nodes of the same form, whose leaves are pages.
 #![no_std]
 #![forbid(unsafe_code)]
+
+#[cfg(not(target_endian = "little"))]
+compile_error!("pages are little-endian blocks that are read in place");
+
+mod directory;
+mod node;
+mod page;
+mod primitives;
+
+pub use directory::{Directory, DirectoryError, PageEntry};
+pub use node::{Child, Node, WIDTH};
+pub use page::{HEADER_BYTES, Header, Line, PAGE_BYTES_MAX, PageError, PageView, Tables, lines_for};
+pub use primitives::{BLOCK, ConeRecord, Kind, Slot, SphereBlock, TriangleBlock};
+
+/// Levels of wide nodes in a page, and in a directory, at most: what bounds every walk's stack.
+pub const DEPTH_MAX: usize = 40;

@@ -1,0 +1,341 @@
+//! Cuts a binary tree into pages: the largest subtrees that fit.
+
+use crate::BINARY_DEPTH_MAX;
+use crate::binary::{BinaryNode, Item, bounds};
+use crate::collapse::{Binary, Full, collapse};
+use bytemuck::Zeroable;
+use hybray_geometry::{Aabb, Cone, Sphere, Triangle};
+use hybray_scene::{
+    BLOCK, Child, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, SphereBlock, TriangleBlock,
+    lines_for,
+};
+
+/// The caller's primitives, by [`Item::id`].
+pub trait Primitives {
+    /// The triangle `id`; its box is within that of the item.
+    fn triangle(&self, id: u32) -> Triangle;
+    /// The sphere `id`.
+    fn sphere(&self, id: u32) -> Sphere;
+    /// The cone `id`.
+    fn cone(&self, id: u32) -> Cone;
+    /// The material of a primitive.
+    fn material(&self, id: u32) -> u16;
+    /// The packed vertex normals of triangle `id`, if it has them.
+    fn normals(&self, id: u32) -> Option<[u32; 3]>;
+}
+
+const NODES_MAX: usize = PAGE_BYTES_MAX / size_of::<Node>();
+const TRIANGLES_MAX: usize = PAGE_BYTES_MAX / size_of::<TriangleBlock>();
+const SPHERES_MAX: usize = PAGE_BYTES_MAX / size_of::<SphereBlock>();
+const CONES_MAX: usize = PAGE_BYTES_MAX / size_of::<ConeRecord>();
+/// Blocks of primitives in a leaf at most: longer ones are halved.
+const LEAF_BLOCKS: u32 = 4;
+/// Least bytes that a primitive takes in a page.
+const PRIMITIVE_BYTES_MIN: usize = 20;
+
+/// A page under construction: about 340 KB of scratch, so keep one and use it again.
+pub struct Scratch {
+    nodes: [Node; NODES_MAX],
+    contents: Contents,
+    page: [Line; PAGE_BYTES_MAX / 64],
+}
+
+/// Primitives of a page, by kind.
+struct Contents {
+    triangles: [TriangleBlock; TRIANGLES_MAX],
+    spheres: [SphereBlock; SPHERES_MAX],
+    cones: [ConeRecord; CONES_MAX],
+    normals: [[u32; 3]; TRIANGLES_MAX * BLOCK],
+    triangle_materials: [u16; TRIANGLES_MAX * BLOCK],
+    sphere_materials: [u16; SPHERES_MAX * BLOCK],
+    cone_materials: [u16; CONES_MAX],
+}
+
+impl Scratch {
+    /// Zeroed scratch. Large: put it where large things go.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            nodes: [Node::EMPTY; NODES_MAX],
+            contents: Contents {
+                triangles: [Zeroable::zeroed(); TRIANGLES_MAX],
+                spheres: [Zeroable::zeroed(); SPHERES_MAX],
+                cones: [Zeroable::zeroed(); CONES_MAX],
+                normals: [[0; 3]; TRIANGLES_MAX * BLOCK],
+                triangle_materials: [0; TRIANGLES_MAX * BLOCK],
+                sphere_materials: [0; SPHERES_MAX * BLOCK],
+                cone_materials: [0; CONES_MAX],
+            },
+            page: [Line([0; 64]); PAGE_BYTES_MAX / 64],
+        }
+    }
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A subtree: a node, or a range of a leaf's items that is cut further.
+#[derive(Clone, Copy)]
+struct Part {
+    aabb: Aabb,
+    first: u32,
+    count: u32,
+    /// Index of the node, or [`RANGE`].
+    node: u32,
+}
+
+const RANGE: u32 = u32::MAX;
+
+/// What is cut.
+struct Subject<'a> {
+    nodes: &'a [BinaryNode],
+    items: &'a [Item],
+}
+
+impl Subject<'_> {
+    fn node(&self, index: u32) -> Part {
+        let n = &self.nodes[index as usize];
+        Part { aabb: n.aabb, first: n.first, count: n.count, node: index }
+    }
+
+    fn items(&self, part: &Part) -> &[Item] {
+        &self.items[part.first as usize..][..part.count as usize]
+    }
+
+    fn children(&self, part: &Part) -> Option<[Part; 2]> {
+        if part.node != RANGE && !self.nodes[part.node as usize].is_leaf() {
+            return Some([self.node(part.node + 1), self.node(self.nodes[part.node as usize].second)]);
+        }
+        // A leaf's items are sorted by kind: it is divided where the kind changes, or else in the middle.
+        let items = self.items(part);
+        let kind = items.first()?.kind;
+        let same = items.partition_point(|item| item.kind == kind) as u32;
+        let most = match kind {
+            Kind::Triangle | Kind::Sphere => LEAF_BLOCKS * BLOCK as u32,
+            Kind::Cone => LEAF_BLOCKS,
+        };
+        let first = if same < part.count {
+            same
+        } else if part.count > most {
+            part.count / 2
+        } else {
+            return None;
+        };
+        let half = |first, count| {
+            let aabb = bounds(&self.items[first as usize..][..count as usize]);
+            Part { aabb, first, count, node: RANGE }
+        };
+        Some([half(part.first, first), half(part.first + first, part.count - first)])
+    }
+}
+
+/// A page being filled.
+struct Filling<'a, P> {
+    subject: &'a Subject<'a>,
+    source: &'a P,
+    contents: &'a mut Contents,
+    counts: Header,
+    smooth: bool,
+    bytes_max: usize,
+}
+
+impl<P: Primitives> Binary for Filling<'_, P> {
+    type Part = Part;
+
+    fn aabb(&self, part: Part) -> Aabb {
+        part.aabb
+    }
+
+    fn children(&self, part: Part) -> Option<[Part; 2]> {
+        self.subject.children(&part)
+    }
+
+    fn leaf(&mut self, part: Part) -> Option<Child> {
+        let items = self.subject.items(&part);
+        let kind = items.first()?.kind;
+        let c = &mut *self.contents;
+        let blocks = items.len().div_ceil(BLOCK);
+        // Lanes beyond the last item repeat it.
+        let lanes = (0..blocks * BLOCK).map(|i| (i / BLOCK, i % BLOCK, items[i.min(items.len() - 1)].id));
+        let (start, count) = match kind {
+            Kind::Triangle => {
+                let start = self.counts.triangle_blocks as usize;
+                let room = c.triangles.get_mut(start..start + blocks)?;
+                for (block, lane, id) in lanes {
+                    let slot = (start + block) * BLOCK + lane;
+                    room[block].set(lane, &self.source.triangle(id), id);
+                    c.triangle_materials[slot] = self.source.material(id);
+                    let normals = self.source.normals(id);
+                    self.smooth |= normals.is_some();
+                    c.normals[slot] = normals.unwrap_or([FLAT; 3]);
+                }
+                self.counts.triangle_blocks += blocks as u32;
+                (start, blocks)
+            }
+            Kind::Sphere => {
+                let start = self.counts.sphere_blocks as usize;
+                let room = c.spheres.get_mut(start..start + blocks)?;
+                for (block, lane, id) in lanes {
+                    room[block].set(lane, &self.source.sphere(id), id);
+                    c.sphere_materials[(start + block) * BLOCK + lane] = self.source.material(id);
+                }
+                self.counts.sphere_blocks += blocks as u32;
+                (start, blocks)
+            }
+            Kind::Cone => {
+                let start = self.counts.cones as usize;
+                let room = c.cones.get_mut(start..start + items.len())?;
+                for (i, item) in items.iter().enumerate() {
+                    room[i] = ConeRecord::new(&self.source.cone(item.id), item.id);
+                    c.cone_materials[start + i] = self.source.material(item.id);
+                }
+                self.counts.cones += items.len() as u32;
+                (start, items.len())
+            }
+        };
+        (self.counts.bytes_for() as usize <= self.bytes_max).then_some(Child::Leaf {
+            kind,
+            start: start as u32,
+            count: count as u32,
+        })
+    }
+}
+
+/// Packed vertex normals of a triangle that has none.
+pub const FLAT: u32 = u32::MAX;
+
+/// Makes one page of `part`, or finds that it does not fit.
+fn fill<P: Primitives>(
+    subject: &Subject<'_>,
+    part: &Part,
+    source: &P,
+    bytes_max: usize,
+    scratch: &mut Scratch,
+) -> Result<usize, Full> {
+    if part.count as usize * PRIMITIVE_BYTES_MIN > bytes_max {
+        return Err(Full);
+    }
+    let Scratch { nodes, contents, page } = scratch;
+    let mut header = Header {
+        magic: Header::MAGIC,
+        materials: 1,
+        lo: part.aabb.lo.to_array(),
+        hi: part.aabb.hi.to_array(),
+        ..Zeroable::zeroed()
+    };
+    let mut filling =
+        Filling { subject, source, contents, counts: header, smooth: false, bytes_max };
+    header.nodes = collapse(&mut filling, *part, nodes)? as u32;
+    let (counts, smooth) = (filling.counts, filling.smooth);
+    header.triangle_blocks = counts.triangle_blocks;
+    header.sphere_blocks = counts.sphere_blocks;
+    header.cones = counts.cones;
+    let (nt, ns, nc) = (counts.triangle_blocks as usize, counts.sphere_blocks as usize, counts.cones as usize);
+    header.normals = if smooth { (nt * BLOCK) as u32 } else { 0 };
+    let materials = [
+        &contents.triangle_materials[..nt * BLOCK],
+        &contents.sphere_materials[..ns * BLOCK],
+        &contents.cone_materials[..nc],
+    ];
+    let mut all = materials.iter().flat_map(|m| m.iter());
+    let one = all.next().is_none_or(|first| all.all(|m| m == first));
+    header.materials = if one { 1 } else { header.material_slots() };
+    let bytes = header.bytes_for() as usize;
+    if bytes > bytes_max {
+        return Err(Full);
+    }
+    header.bytes = bytes as u32;
+
+    let page: &mut [u8] = bytemuck::cast_slice_mut(&mut page[..]);
+    let mut at = 0;
+    let mut put = |bytes: &[u8]| {
+        page[at..at + bytes.len()].copy_from_slice(bytes);
+        at += bytes.len();
+    };
+    put(bytemuck::bytes_of(&header));
+    put(bytemuck::cast_slice(&nodes[..header.nodes as usize]));
+    put(bytemuck::cast_slice(&contents.triangles[..nt]));
+    put(bytemuck::cast_slice(&contents.spheres[..ns]));
+    put(bytemuck::cast_slice(&contents.cones[..nc]));
+    put(bytemuck::cast_slice(&contents.normals[..header.normals as usize]));
+    let mut left = header.materials as usize;
+    for m in materials {
+        let n = m.len().min(left);
+        put(bytemuck::cast_slice(&m[..n]));
+        left -= n;
+    }
+    page[at..bytes.next_multiple_of(64)].fill(0);
+    Ok(bytes)
+}
+
+/// What became of a subtree: told to the caller of [`pages`] in preorder.
+pub enum Cut<'a> {
+    /// A page, padded to whole lines with zeros.
+    Page(&'a [Line]),
+    /// A node above pages, whose children follow.
+    Above,
+}
+
+/// Why a tree could not be cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CutError {
+    /// One leaf of primitives is larger than a page.
+    #[error("a page of {bytes_max} bytes cannot hold even one leaf of primitives; 4096 bytes can")]
+    PageTooSmall {
+        /// The size asked for.
+        bytes_max: usize,
+    },
+}
+
+/// Cuts the tree of `nodes` over `items` into pages of at most `bytes_max` bytes: in preorder, each subtree either is a
+/// page, or lies above pages. `emit` gets both with their boxes; [`crate::top::TopNode`]s are made of them.
+///
+/// Bounded by the size of the tree times the page size over the least page.
+///
+/// # Errors
+/// See [`CutError`].
+pub fn pages<P: Primitives>(
+    nodes: &[BinaryNode],
+    items: &[Item],
+    source: &P,
+    bytes_max: usize,
+    scratch: &mut Scratch,
+    emit: &mut impl FnMut(&Aabb, Cut<'_>),
+) -> Result<(), CutError> {
+    let bytes_max = bytes_max.min(PAGE_BYTES_MAX);
+    let subject = Subject { nodes, items };
+    let mut stack = [Part { aabb: Aabb::EMPTY, first: 0, count: 0, node: RANGE }; BINARY_DEPTH_MAX as usize + 40];
+    let mut waiting = 0;
+    if !nodes.is_empty() && !nodes[0].aabb.is_empty() {
+        stack[0] = subject.node(0);
+        waiting = 1;
+    }
+    while waiting > 0 {
+        waiting -= 1;
+        let part = stack[waiting];
+        if part.aabb.is_empty() {
+            continue;
+        }
+        if let Ok(bytes) = fill(&subject, &part, source, bytes_max, scratch) {
+            emit(&part.aabb, Cut::Page(&scratch.page[..lines_for(bytes)]));
+            continue;
+        }
+        let Some([first, second]) = subject.children(&part) else {
+            return Err(CutError::PageTooSmall { bytes_max });
+        };
+        // An empty child would be an inner node with one child only: the other stands for both.
+        if first.aabb.is_empty() || second.aabb.is_empty() {
+            stack[waiting] = if first.aabb.is_empty() { second } else { first };
+            waiting += 1;
+            continue;
+        }
+        emit(&part.aabb, Cut::Above);
+        stack[waiting] = second;
+        stack[waiting + 1] = first;
+        waiting += 2;
+    }
+    Ok(())
+}

@@ -1,0 +1,210 @@
+//! Top-down binned surface-area heuristic (Wald, *On fast construction of SAH-based bounding volume hierarchies*, 2007).
+
+use crate::BINARY_DEPTH_MAX;
+use crate::binary::{BinaryNode, Item, Pending, bounds};
+use hybray_geometry::{Aabb, Vec3};
+use hybray_scene::BLOCK;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Ranges of at most this many items are leaves without more ado: 1 to build to the end, more to leave the rest of
+    /// the work to another thread.
+    pub stop_at: u32,
+    /// Most items of a leaf that the heuristic may make; at most 64.
+    pub leaf_max: u32,
+    /// Depth of the root, when this tree goes below another.
+    pub depth: u32,
+    /// Cost of a wide node's boxes, in tests of a block of primitives.
+    pub node_cost: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { stop_at: 1, leaf_max: 16, depth: 0, node_cost: 0.5 }
+    }
+}
+
+const BINS: usize = 16;
+const STACK: usize = BINARY_DEPTH_MAX as usize + 1;
+
+/// Nodes that `items` items need at most.
+#[must_use]
+pub const fn nodes_for(items: usize) -> usize {
+    if items == 0 { 0 } else { 2 * items - 1 }
+}
+
+/// Builds a tree over `items`, which are put in the order of its leaves, into `nodes`; returns how many it used.
+///
+/// Bounded by the number of items times [`BINARY_DEPTH_MAX`]. Items that no plane separates are split by their order.
+///
+/// # Panics
+/// If `nodes` is shorter than [`nodes_for`] says.
+pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) -> usize {
+    if items.is_empty() {
+        return 0;
+    }
+    let mut used = 0;
+    let mut stack = [Pending::NONE; STACK];
+    let mut waiting = 1;
+    stack[0] = Pending { first: 0, count: items.len() as u32, depth: settings.depth, parent: u32::MAX };
+    while waiting > 0 {
+        waiting -= 1;
+        let mut part = stack[waiting];
+        if part.parent != u32::MAX {
+            nodes[part.parent as usize].second = used as u32;
+        }
+        // Down the first children, leaving the second ones on the stack: one entry a level.
+        loop {
+            let range = &mut items[part.first as usize..][..part.count as usize];
+            let aabb = bounds(range);
+            let here = used;
+            nodes[here] = BinaryNode { aabb, first: part.first, count: part.count, second: 0 };
+            used += 1;
+            let Some(left) = split(range, &aabb, part.depth, settings) else {
+                range.sort_unstable_by_key(|item| (item.kind, item.id));
+                break;
+            };
+            let left = left as u32;
+            stack[waiting] = Pending {
+                first: part.first + left,
+                count: part.count - left,
+                depth: part.depth + 1,
+                parent: here as u32,
+            };
+            waiting += 1;
+            part = Pending { first: part.first, count: left, depth: part.depth + 1, parent: u32::MAX };
+        }
+    }
+    used
+}
+
+#[derive(Clone, Copy)]
+struct Bin {
+    aabb: Aabb,
+    count: u32,
+}
+
+const EMPTY: Bin = Bin { aabb: Aabb::EMPTY, count: 0 };
+
+struct Plane {
+    axis: usize,
+    /// Bins below this go first.
+    bin: usize,
+    cost: f32,
+}
+
+/// Which bin a centroid falls into: monotone, so that a plane between bins is a plane in space.
+struct Binning {
+    lo: Vec3,
+    scale: Vec3,
+}
+
+impl Binning {
+    fn new(centroids: &Aabb) -> Self {
+        let extent = centroids.hi - centroids.lo;
+        let scale = |e: f32| {
+            let s = BINS as f32 * (1.0 - 1e-6) / e;
+            if s.is_finite() { s } else { 0.0 }
+        };
+        Self { lo: centroids.lo, scale: Vec3::new(scale(extent.x), scale(extent.y), scale(extent.z)) }
+    }
+
+    #[inline(always)]
+    fn bins(&self, item: &Item) -> [usize; 3] {
+        let at = (centroid(item) - self.lo) * self.scale;
+        [at.x, at.y, at.z].map(|x| (x as usize).min(BINS - 1))
+    }
+}
+
+#[inline(always)]
+fn centroid(item: &Item) -> Vec3 {
+    item.lo * 0.5 + item.hi * 0.5
+}
+
+fn blocks(count: u32) -> f32 {
+    count.div_ceil(BLOCK as u32) as f32
+}
+
+/// Reorders `items` so that the first child's come first, and returns how many those are; `None` for a leaf.
+fn split(items: &mut [Item], aabb: &Aabb, depth: u32, settings: &Settings) -> Option<usize> {
+    let count = items.len() as u32;
+    if count <= settings.stop_at.max(1) {
+        return None;
+    }
+    // Halving ends in time from any depth that leaves as many levels as the count has bits.
+    if depth + (32 - count.leading_zeros()) >= BINARY_DEPTH_MAX {
+        return Some(items.len() / 2);
+    }
+    let centroids = items.iter().fold(Aabb::EMPTY, |b, i| {
+        let c = centroid(i);
+        b.union(&Aabb { lo: c, hi: c })
+    });
+    let binning = Binning::new(&centroids);
+    let plane = best_plane(items, &binning);
+    let leaf_cost = blocks(count);
+    let area = aabb.half_area();
+    match plane {
+        Some(plane) => {
+            let cost = settings.node_cost + plane.cost / if area > 0.0 { area } else { f32::MIN_POSITIVE };
+            if count <= settings.leaf_max && leaf_cost <= cost {
+                return None;
+            }
+            Some(partition(items, |item| binning.bins(item)[plane.axis] < plane.bin))
+        }
+        None if count <= settings.leaf_max => None,
+        None => Some(items.len() / 2),
+    }
+}
+
+fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
+    let mut bins = [[EMPTY; BINS]; 3];
+    for item in items {
+        let aabb = item.aabb();
+        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
+            let bin = &mut bins[axis][bin];
+            bin.aabb = bin.aabb.union(&aabb);
+            bin.count += 1;
+        }
+    }
+    let mut best: Option<Plane> = None;
+    for (axis, bins) in bins.iter().enumerate() {
+        let mut above = [0.0; BINS];
+        let mut sum = EMPTY;
+        for bin in (1..BINS).rev() {
+            sum = merged(&sum, &bins[bin]);
+            above[bin] = sum.aabb.half_area() * blocks(sum.count);
+        }
+        let mut sum = EMPTY;
+        for bin in 1..BINS {
+            sum = merged(&sum, &bins[bin - 1]);
+            let cost = sum.aabb.half_area() * blocks(sum.count) + above[bin];
+            let separates = sum.count > 0 && sum.count < items.len() as u32;
+            if separates && best.as_ref().is_none_or(|b| cost < b.cost) {
+                best = Some(Plane { axis, bin, cost });
+            }
+        }
+    }
+    best
+}
+
+fn merged(a: &Bin, b: &Bin) -> Bin {
+    Bin { aabb: a.aabb.union(&b.aabb), count: a.count + b.count }
+}
+
+/// Puts the items for which `first` holds in front; returns how many.
+fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
+    let (mut from, mut to) = (0, items.len());
+    loop {
+        while from < to && first(&items[from]) {
+            from += 1;
+        }
+        while from < to && !first(&items[to - 1]) {
+            to -= 1;
+        }
+        if from >= to {
+            return from;
+        }
+        items.swap(from, to - 1);
+    }
+}

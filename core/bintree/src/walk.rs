@@ -1,0 +1,287 @@
+//! The walk of one ray: nearest hit and any hit.
+
+use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
+use hybray_geometry::{Candidate, LaneRay, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
+use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, Node, PageView, Slot, WIDTH};
+
+/// A scene whose pages are all at hand.
+#[derive(Clone, Copy, Debug)]
+pub struct Resident<'a> {
+    /// The top of the tree.
+    pub directory: Directory<'a>,
+    /// Every page, by number.
+    pub pages: &'a [PageView<'a>],
+}
+
+/// A nearest hit and where its primitive is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance and primitive.
+    pub candidate: Candidate,
+    /// Page that holds it (one of them, if several do).
+    pub page: u32,
+    /// Its place there.
+    pub slot: Slot,
+}
+
+impl Hit {
+    /// No hit up to `t_max`.
+    #[must_use]
+    pub const fn none(t_max: f32) -> Self {
+        Self { candidate: Candidate::none(t_max), page: 0, slot: Slot(0) }
+    }
+}
+
+/// What a walk did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Wide nodes whose boxes were tested.
+    pub nodes: u64,
+    /// Blocks of primitives, and cones, that were tested.
+    pub blocks: u64,
+    /// Pages that were entered.
+    pub pages: u64,
+}
+
+const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
+
+/// What a walk keeps while it goes: lent by the caller, since clearing it for each ray would cost as much as a short
+/// walk. 4.5 KB.
+#[derive(Clone, Debug)]
+pub struct Stack {
+    waiting: [(f32, u32); STACK],
+}
+
+impl Stack {
+    /// An empty stack.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { waiting: [(0.0, 0); STACK] }
+    }
+}
+
+impl Default for Stack {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The nearest hit of `ray`.
+#[must_use]
+pub fn nearest(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut Stack, counts: &mut Counts) -> Hit {
+    kernels.run(Walk::<false> { scene, ray, stack, counts })
+}
+
+/// Whether anything is hit.
+#[must_use]
+pub fn occluded(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut Stack, counts: &mut Counts) -> bool {
+    kernels.run(Walk::<true> { scene, ray, stack, counts }).candidate.is_hit()
+}
+
+/// A walk as a kernel, for callers that run one themselves.
+pub struct Walk<'w, 'a, const ANY: bool> {
+    /// Where.
+    pub scene: &'w Resident<'a>,
+    /// What.
+    pub ray: &'w Ray,
+    /// Scratch.
+    pub stack: &'w mut Stack,
+    /// Added to.
+    pub counts: &'w mut Counts,
+}
+
+impl<const ANY: bool> Kernel for Walk<'_, '_, ANY> {
+    type Output = Hit;
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Hit {
+        let kernel = RayKernel::new(self.ray);
+        let mut walker = Walker::<S> {
+            simd,
+            boxes: BoxRay::new(simd, &kernel),
+            lanes: kernel.splat(simd.splat4(0.0)),
+            kernel,
+            best: Hit::none(self.ray.t_max),
+            counts: Counts::default(),
+        };
+        walker.directory::<ANY>(self.scene, self.stack);
+        self.counts.nodes += walker.counts.nodes;
+        self.counts.blocks += walker.counts.blocks;
+        self.counts.pages += walker.counts.pages;
+        walker.best
+    }
+}
+
+/// What a ray needs to meet eight boxes.
+struct BoxRay<S: Simd> {
+    origin: [S::F8; 3],
+    inverse: [S::F8; 3],
+    negative: [bool; 3],
+    t_min: S::F8,
+}
+
+impl<S: Simd> BoxRay<S> {
+    #[inline(always)]
+    fn new(simd: S, ray: &RayKernel) -> Self {
+        Self {
+            origin: ray.origin.map(|x| simd.splat8(x)),
+            inverse: ray.inverse.map(|x| simd.splat8(x)),
+            negative: ray.inverse.map(f32::is_sign_negative),
+            t_min: simd.splat8(ray.t_min),
+        }
+    }
+}
+
+struct Walker<S: Simd> {
+    simd: S,
+    boxes: BoxRay<S>,
+    lanes: LaneRay<S::F4>,
+    kernel: RayKernel,
+    best: Hit,
+    counts: Counts,
+}
+
+impl<S: Simd> Walker<S> {
+    /// Through the directory, from page to page.
+    #[inline(always)]
+    fn directory<const ANY: bool>(&mut self, scene: &Resident<'_>, stack: &mut Stack) {
+        let waiting = &mut stack.waiting;
+        if scene.directory.nodes.is_empty() {
+            return;
+        }
+        waiting[0] = (self.kernel.t_min, Child::Inner(0).pack());
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (near, packed) = waiting[top];
+            if near > self.best.candidate.t {
+                continue;
+            }
+            match Child::unpack(packed) {
+                Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
+                Child::Page(page) => {
+                    self.counts.pages += 1;
+                    self.page::<ANY>(page, &scene.pages[page as usize], waiting, top);
+                    if ANY && self.best.candidate.is_hit() {
+                        return;
+                    }
+                }
+                Child::Leaf { .. } | Child::Unused => {}
+            }
+        }
+    }
+
+    /// Through one page, on the part of the stack above `base`.
+    #[inline(always)]
+    fn page<const ANY: bool>(
+        &mut self,
+        number: u32,
+        page: &PageView<'_>,
+        waiting: &mut [(f32, u32); STACK],
+        base: usize,
+    ) {
+        waiting[base] = (self.kernel.t_min, Child::Inner(0).pack());
+        let mut top = base + 1;
+        while top > base {
+            top -= 1;
+            let (near, packed) = waiting[top];
+            if near > self.best.candidate.t {
+                continue;
+            }
+            match Child::unpack(packed) {
+                Child::Inner(index) => top = self.node(&page.nodes[index as usize], waiting, top),
+                Child::Leaf { kind, start, count } => {
+                    self.leaf(number, page, kind, start as usize, count as usize);
+                    if ANY && self.best.candidate.is_hit() {
+                        return;
+                    }
+                }
+                Child::Page(_) | Child::Unused => {}
+            }
+        }
+    }
+
+    /// Pushes the children of a node that the ray enters before its best hit, the nearest last; returns the new top.
+    #[inline(always)]
+    fn node(&mut self, node: &Node, waiting: &mut [(f32, u32); STACK], top: usize) -> usize {
+        self.counts.nodes += 1;
+        let b = &self.boxes;
+        let planes = |axis: usize| {
+            let (lo, hi) = (&node.lo[axis], &node.hi[axis]);
+            if b.negative[axis] { (hi, lo) } else { (lo, hi) }
+        };
+        let ((x0, x1), (y0, y1), (z0, z1)) = (planes(0), planes(1), planes(2));
+        let simd = self.simd;
+        let (near, far) = slab(
+            &b.origin,
+            &b.inverse,
+            &[simd.load8(x0), simd.load8(y0), simd.load8(z0)],
+            &[simd.load8(x1), simd.load8(y1), simd.load8(z1)],
+            b.t_min,
+        );
+        let best = simd.splat8(self.best.candidate.t);
+        let mut met = (near.le(far) & near.le(best)).bits();
+        let near = near.to_array();
+        let mut end = top;
+        while met != 0 {
+            let slot = met.trailing_zeros() as usize & (WIDTH - 1);
+            met &= met - 1;
+            let entry = (near[slot], node.child[slot]);
+            // Insertion: most nodes are left with one to three children.
+            let mut at = end;
+            while at > top && waiting[at - 1].0 < entry.0 {
+                waiting[at] = waiting[at - 1];
+                at -= 1;
+            }
+            waiting[at] = entry;
+            end += 1;
+        }
+        end
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, number: u32, page: &PageView<'_>, kind: Kind, start: usize, count: usize) {
+        self.counts.blocks += count as u64;
+        match kind {
+            Kind::Triangle => {
+                for (i, block) in page.triangles[start..start + count].iter().enumerate() {
+                    let v = block.v.map(|vertex| vertex.map(|lane| self.simd.load4(&lane)));
+                    let (t, hit) = triangle_lanes(&self.lanes, &v);
+                    self.keep(t, hit, &block.id, number, kind, start + i);
+                }
+            }
+            Kind::Sphere => {
+                for (i, block) in page.spheres[start..start + count].iter().enumerate() {
+                    let centre = block.centre.map(|lane| self.simd.load4(&lane));
+                    let (t, hit) = sphere_lanes(&self.lanes, &centre, self.simd.load4(&block.radius));
+                    self.keep(t, hit, &block.id, number, kind, start + i);
+                }
+            }
+            Kind::Cone => {
+                for (i, cone) in page.cones[start..start + count].iter().enumerate() {
+                    if let Some(candidate) = cone.get().hit(&self.kernel, cone.id, &self.best.candidate) {
+                        self.best = Hit { candidate, page: number, slot: Slot::new(kind, start + i) };
+                    }
+                }
+            }
+        }
+    }
+
+    /// Keeps the first of the lanes in `hit`, if it goes before the best.
+    #[inline(always)]
+    fn keep(&mut self, t: S::F4, hit: u32, ids: &[u32; BLOCK], page: u32, kind: Kind, block: usize) {
+        if hit == 0 {
+            return;
+        }
+        let inside = self.lanes.t_min.le(t) & t.le(self.simd.splat4(self.best.candidate.t));
+        let mut hit = hit & inside.bits();
+        let t = t.to_array();
+        while hit != 0 {
+            let lane = hit.trailing_zeros() as usize & (BLOCK - 1);
+            hit &= hit - 1;
+            let candidate = Candidate { t: t[lane], id: ids[lane] };
+            if candidate.precedes(&self.best.candidate) {
+                self.best = Hit { candidate, page, slot: Slot::new(kind, block * BLOCK + lane) };
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Triangles: Woop's watertight test (Woop, Benthin and Wald, JCGT 2013).
+
+use crate::simd::{Lanes, Mask, ONE_LANE};
+use crate::{Aabb, Candidate, LaneRay, RayKernel, SurfacePoint, Vec3, gamma, normalize};
+
+/// Three vertices, counterclockwise seen from its front; hit from both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// Vertices.
+    pub v: [Vec3; 3],
+}
+
+/// Triangles side by side: `[vertex][axis]`.
+pub type TriangleLanes<F> = [[F; 3]; 3];
+
+/// Edge functions of a triangle in the ray's sheared space, whose sum is the determinant.
+struct Edges<F> {
+    u: F,
+    v: F,
+    w: F,
+    /// Scaled distances of the three vertices.
+    z: [F; 3],
+    /// Sheared x and y of the three vertices: `[vertex][x, y]`.
+    xy: [[F; 2]; 3],
+}
+
+/// Where an edge function is zero, its sign is taken in `f64`: products of two `f32` are exact there, so the sign of
+/// their difference is too, and a ray on a shared edge is inside one of its triangles or the other.
+#[inline(always)]
+fn edges<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -> Edges<F> {
+    let [x, y, z] = ray.axes;
+    let mut xy = [[ray.shear[0]; 2]; 3];
+    let mut depth = [ray.shear[0]; 3];
+    for i in 0..3 {
+        let away = triangle[i][z] - ray.origin[z];
+        xy[i] = [
+            triangle[i][x] - ray.origin[x] - ray.shear[0] * away,
+            triangle[i][y] - ray.origin[y] - ray.shear[1] * away,
+        ];
+        depth[i] = ray.shear[2] * away;
+    }
+    let [a, b, c] = xy;
+    let mut edge = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
+    let zero = ray.shear[0].splat_like(0.0);
+    let on_edge = (edge[0].equal(zero) | edge[1].equal(zero) | edge[2].equal(zero)).bits();
+    if on_edge != 0 {
+        exact_edges(&mut edge, &xy, on_edge);
+    }
+    Edges { u: edge[0], v: edge[1], w: edge[2], z: depth, xy }
+}
+
+#[cold]
+#[inline(never)]
+fn exact_edges<F: Lanes>(edge: &mut [F; 3], xy: &[[F; 2]; 3], lanes: u32) {
+    let corner = xy.map(|p| p.map(F::to_array));
+    let mut arrays = edge.map(F::to_array);
+    for lane in (0..F::LANES).filter(|lane| lanes >> lane & 1 != 0) {
+        let at = |i: usize, axis: usize| f64::from(corner[i][axis].as_ref()[lane]);
+        for (i, (p, q)) in [(2, 1), (0, 2), (1, 0)].into_iter().enumerate() {
+            arrays[i].as_mut()[lane] = (at(p, 0) * at(q, 1) - at(p, 1) * at(q, 0)) as f32;
+        }
+    }
+    for i in 0..3 {
+        edge[i] = edge[i].load_like(&arrays[i]);
+    }
+}
+
+/// Tests each lane's ray against its triangle. Lanes in the mask are hit, at the distance returned, clamped to the own
+/// box; `t_min` and the best distance are the caller's to compare.
+#[inline(always)]
+pub fn triangle_lanes<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -> (F, u32) {
+    let e = edges(ray, triangle);
+    let zero = e.u.splat_like(0.0);
+    let below = e.u.lt(zero) | e.v.lt(zero) | e.w.lt(zero);
+    let above = zero.lt(e.u) | zero.lt(e.v) | zero.lt(e.w);
+    let det = e.u + e.v + e.w;
+    let accepted = !(below & above) & !det.equal(zero);
+    if accepted.bits() == 0 {
+        return (zero, 0);
+    }
+    let t = (e.u * e.z[0] + e.v * e.z[1] + e.w * e.z[2]) / det;
+    let (lo, hi) = own_box(triangle);
+    let (near, far) = ray.own_slab(&lo, &hi);
+    let inside = accepted & near.le(far);
+    (near.select(t.lt(near), far.select(far.lt(t), t)), inside.bits())
+}
+
+#[inline(always)]
+fn own_box<F: Lanes>(v: &TriangleLanes<F>) -> ([F; 3], [F; 3]) {
+    let (mut lo, mut hi) = (v[0], v[0]);
+    for i in 0..3 {
+        lo[i] = v[2][i].or_less(v[1][i].or_less(v[0][i]));
+        hi[i] = v[2][i].or_greater(v[1][i].or_greater(v[0][i]));
+    }
+    (lo, hi)
+}
+
+impl Triangle {
+    /// The least box around the vertices.
+    #[must_use]
+    #[inline]
+    pub fn aabb(&self) -> Aabb {
+        Aabb::around(&self.v)
+    }
+
+    fn one_lane(&self) -> TriangleLanes<crate::simd::OneLane> {
+        self.v.map(|p| p.to_array().map(|x| ONE_LANE.splat_like(x)))
+    }
+
+    /// The hit of `ray` before `best`, if there is one: [`triangle_lanes`] with one lane.
+    #[must_use]
+    pub fn hit(&self, ray: &RayKernel, id: u32, best: &Candidate) -> Option<Candidate> {
+        let (t, hit) = triangle_lanes(&ray.splat(ONE_LANE), &self.one_lane());
+        let found = Candidate { t: t.to_array()[0], id };
+        (hit != 0 && found.t >= ray.t_min && found.precedes(best)).then_some(found)
+    }
+
+    /// The place of a hit that [`Triangle::hit`] found at `t`.
+    ///
+    /// Position from barycentrics: error gamma(7) of the terms' magnitudes; distance: the bound of Pharr, Jakob and
+    /// Humphreys, *Physically Based Rendering*, 4th edition, section 6.8.7.
+    #[must_use]
+    pub fn surface(&self, ray: &RayKernel, t: f32) -> SurfacePoint {
+        let e = edges(&ray.splat(ONE_LANE), &self.one_lane());
+        let get = |x: crate::simd::OneLane| x.to_array()[0];
+        let (u, v, w) = (get(e.u), get(e.v), get(e.w));
+        let inverse_det = 1.0 / (u + v + w);
+        let b = [u * inverse_det, v * inverse_det, w * inverse_det];
+        let terms = [self.v[0] * b[0], self.v[1] * b[1], self.v[2] * b[2]];
+
+        let most = |a: [f32; 3]| a.into_iter().fold(0.0f32, |m, x| if x.abs() > m { x.abs() } else { m });
+        let x = most(e.xy.map(|p| get(p[0])));
+        let y = most(e.xy.map(|p| get(p[1])));
+        let z = most(e.z.map(get));
+        let (dz, dx, dy) = (gamma(3) * z, gamma(5) * (x + z), gamma(5) * (y + z));
+        let de = 2.0 * (gamma(2) * x * y + dy * x + dx * y);
+        let edge = most([u, v, w]);
+
+        SurfacePoint {
+            t,
+            t_error: 3.0 * (gamma(3) * edge * z + de * z + dz * edge) * inverse_det.abs(),
+            position: terms[0] + terms[1] + terms[2],
+            error: (terms[0].abs() + terms[1].abs() + terms[2].abs()) * gamma(7),
+            normal: self.normal(),
+            uv: [b[1], b[2]],
+        }
+    }
+
+    /// Unit normal of the counterclockwise side; an arbitrary axis for a triangle without area, which nothing hits.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        let n = (self.v[1] - self.v[0]).cross(self.v[2] - self.v[0]);
+        // The longest component is made 1 first: the cross product of small edges underflows when squared.
+        let scale = n.abs().max_element();
+        if scale > 0.0 { normalize(n / scale) } else { Vec3::Z }
+    }
+}

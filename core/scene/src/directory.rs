@@ -1,0 +1,69 @@
+//! The directory: wide nodes over all pages, small enough for every node.
+
+use crate::page::check_nodes;
+use crate::{Child, Node, PAGE_BYTES_MAX};
+use bytemuck::{Pod, Zeroable};
+
+/// What is known of a page everywhere. Its box stands in the directory's nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PageEntry {
+    /// Bytes of the page.
+    pub bytes: u32,
+    /// The node that keeps it.
+    pub owner: u16,
+    /// 0: geometry.
+    pub kind: u16,
+}
+
+const _: () = assert!(core::mem::size_of::<PageEntry>() == 8);
+
+/// The top of the tree: with its nodes' boxes, about 40 bytes a page.
+#[derive(Clone, Copy, Debug)]
+pub struct Directory<'a> {
+    /// The root first; children after their parents; leaves are pages. Empty for an empty scene.
+    pub nodes: &'a [Node],
+    /// One for each page.
+    pub entries: &'a [PageEntry],
+}
+
+/// Why this is no directory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DirectoryError {
+    /// A node that leads nowhere, backwards or too deep.
+    #[error("node {node} of the directory is broken: {what}")]
+    Node {
+        /// Its index.
+        node: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// A page of an impossible size.
+    #[error("page {page} of the directory has {bytes} bytes; a page has 1 to 65536")]
+    Size {
+        /// Its number.
+        page: usize,
+        /// What the directory says.
+        bytes: u32,
+    },
+}
+
+impl<'a> Directory<'a> {
+    /// Validates a directory: whatever the bytes, a walk of it ends and names only its pages. `level` is scratch, one
+    /// byte a node.
+    ///
+    /// # Errors
+    /// See [`DirectoryError`].
+    pub fn parse(nodes: &'a [Node], entries: &'a [PageEntry], level: &mut [u8]) -> Result<Self, DirectoryError> {
+        check_nodes(nodes, level, |child| match child {
+            Child::Page(page) if (page as usize) < entries.len() => Ok(()),
+            Child::Page(_) => Err("a page that is not in the directory"),
+            _ => Err("primitives outside a page"),
+        })
+        .map_err(|(node, what)| DirectoryError::Node { node, what })?;
+        match entries.iter().position(|e| e.bytes == 0 || e.bytes as usize > PAGE_BYTES_MAX) {
+            Some(page) => Err(DirectoryError::Size { page, bytes: entries[page].bytes }),
+            None => Ok(Self { nodes, entries }),
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! A page: header, nodes, primitives, and what shading needs of them.
+
+use crate::{BLOCK, Child, ConeRecord, DEPTH_MAX, Kind, Node, Slot, SphereBlock, TriangleBlock};
+use bytemuck::{Pod, Zeroable};
+
+/// Most bytes of a page.
+pub const PAGE_BYTES_MAX: usize = 64 * 1024;
+/// Bytes of a [`Header`].
+pub const HEADER_BYTES: usize = core::mem::size_of::<Header>();
+
+/// Storage for pages: a page starts at a line, so that everything in it is aligned.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Line(pub [u8; 64]);
+
+/// Lines that `bytes` take.
+#[must_use]
+pub const fn lines_for(bytes: usize) -> usize {
+    bytes.div_ceil(64)
+}
+
+/// First 64 bytes of a page. The arrays follow in the order of the counts, without gaps.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Header {
+    /// [`Header::MAGIC`].
+    pub magic: u32,
+    /// Bytes of the whole page, this header included.
+    pub bytes: u32,
+    /// [`Node`]s; the first is the root.
+    pub nodes: u32,
+    /// [`TriangleBlock`]s.
+    pub triangle_blocks: u32,
+    /// [`SphereBlock`]s.
+    pub sphere_blocks: u32,
+    /// [`ConeRecord`]s.
+    pub cones: u32,
+    /// Vertex normals: three packed ones for each triangle lane, or none at all.
+    pub normals: u32,
+    /// Materials: a `u16` for each lane and cone in slot order, or one for all.
+    pub materials: u32,
+    /// Greatest and least corner of everything in the page.
+    pub lo: [f32; 3],
+    /// Greatest corner.
+    pub hi: [f32; 3],
+    /// Zero.
+    pub reserved: [u32; 2],
+}
+
+const _: () = assert!(core::mem::size_of::<Header>() == 64);
+
+impl Header {
+    /// "hyP" and the version of the format.
+    pub const MAGIC: u32 = u32::from_le_bytes(*b"hyP\x01");
+
+    /// Bytes of a page with these counts.
+    #[must_use]
+    pub const fn bytes_for(&self) -> u64 {
+        HEADER_BYTES as u64
+            + self.nodes as u64 * 224
+            + self.triangle_blocks as u64 * 160
+            + self.sphere_blocks as u64 * 80
+            + self.cones as u64 * 36
+            + self.normals as u64 * 12
+            + self.materials as u64 * 2
+    }
+
+    /// Materials of a page whose primitives do not all have the same.
+    #[must_use]
+    pub const fn material_slots(&self) -> u32 {
+        (self.triangle_blocks + self.sphere_blocks) * BLOCK as u32 + self.cones
+    }
+}
+
+/// Lengths of the tables that pages refer to, for validation.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables {
+    /// Materials of the scene.
+    pub materials: usize,
+}
+
+/// Why a block is no page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PageError {
+    /// Shorter than its header says, or than any header.
+    #[error("a page of {bytes} bytes is cut short: it needs {needed}")]
+    Short {
+        /// Bytes at hand.
+        bytes: usize,
+        /// Bytes that it needs.
+        needed: u64,
+    },
+    /// Not a page of this version.
+    #[error("this is no page of this version of Hybray (magic {0:#010x})")]
+    Magic(u32),
+    /// Counts that do not add up, or exceed [`PAGE_BYTES_MAX`].
+    #[error("a page's header contradicts itself: {0}")]
+    Header(&'static str),
+    /// A node that leads nowhere, backwards or too deep.
+    #[error("node {node} of a page is broken: {what}")]
+    Node {
+        /// Its index.
+        node: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// A material beyond the scene's table.
+    #[error("a page refers to material {0}, which the scene does not have")]
+    Material(u16),
+}
+
+/// A validated page, read in place.
+#[derive(Clone, Copy, Debug)]
+pub struct PageView<'a> {
+    /// Its header.
+    pub header: &'a Header,
+    /// The root first; children after their parents.
+    pub nodes: &'a [Node],
+    /// Triangles.
+    pub triangles: &'a [TriangleBlock],
+    /// Spheres.
+    pub spheres: &'a [SphereBlock],
+    /// Cones.
+    pub cones: &'a [ConeRecord],
+    /// Packed vertex normals of each triangle lane; or empty.
+    pub normals: &'a [[u32; 3]],
+    /// One for all, or one for each slot.
+    pub materials: &'a [u16],
+}
+
+impl<'a> PageView<'a> {
+    /// Validates a page, in one pass over its nodes: whatever the bytes, a walk of the result ends and stays inside.
+    ///
+    /// # Errors
+    /// See [`PageError`].
+    pub fn parse(lines: &'a [Line], tables: Tables) -> Result<Self, PageError> {
+        let all: &[u8] = bytemuck::cast_slice(lines);
+        let short = |needed| PageError::Short { bytes: all.len(), needed };
+        if all.len() < HEADER_BYTES {
+            return Err(short(HEADER_BYTES as u64));
+        }
+        let header: &Header = bytemuck::from_bytes(&all[..HEADER_BYTES]);
+        if header.magic != Header::MAGIC {
+            return Err(PageError::Magic(header.magic));
+        }
+        let counts =
+            [header.nodes, header.triangle_blocks, header.sphere_blocks, header.cones, header.normals, header.materials];
+        if counts.iter().any(|&n| n as usize > PAGE_BYTES_MAX) {
+            return Err(PageError::Header("more of something than a page can hold"));
+        }
+        let needed = header.bytes_for();
+        if needed != u64::from(header.bytes) || needed > PAGE_BYTES_MAX as u64 {
+            return Err(PageError::Header("its counts do not make its bytes, or exceed 64 KiB"));
+        }
+        if needed > all.len() as u64 {
+            return Err(short(needed));
+        }
+        if header.nodes == 0 {
+            return Err(PageError::Header("no root"));
+        }
+        if header.materials != 1 && header.materials != header.material_slots() {
+            return Err(PageError::Header("neither one material nor one for each slot"));
+        }
+        if header.normals != 0 && header.normals != header.triangle_blocks * BLOCK as u32 {
+            return Err(PageError::Header("neither no normals nor three for each triangle"));
+        }
+
+        let (_, rest) = all.split_at(HEADER_BYTES);
+        let (nodes, rest) = rest.split_at(header.nodes as usize * 224);
+        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * 160);
+        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * 80);
+        let (cones, rest) = rest.split_at(header.cones as usize * 36);
+        let (normals, rest) = rest.split_at(header.normals as usize * 12);
+        let (materials, _) = rest.split_at(header.materials as usize * 2);
+        let view = Self {
+            header,
+            nodes: bytemuck::cast_slice(nodes),
+            triangles: bytemuck::cast_slice(triangles),
+            spheres: bytemuck::cast_slice(spheres),
+            cones: bytemuck::cast_slice(cones),
+            normals: bytemuck::cast_slice(normals),
+            materials: bytemuck::cast_slice(materials),
+        };
+        check_nodes(view.nodes, &mut [0; PAGE_BYTES_MAX / 224], |child| match child {
+            Child::Leaf { kind, start, count } => {
+                let have = match kind {
+                    Kind::Triangle => view.triangles.len(),
+                    Kind::Sphere => view.spheres.len(),
+                    Kind::Cone => view.cones.len(),
+                };
+                if (start + count) as usize <= have { Ok(()) } else { Err("a leaf beyond the page's primitives") }
+            }
+            Child::Page(_) => Err("a page inside a page"),
+            Child::Inner(_) | Child::Unused => Ok(()),
+        })
+        .map_err(|(node, what)| PageError::Node { node, what })?;
+        if let Some(&material) = view.materials.iter().find(|&&m| usize::from(m) >= tables.materials) {
+            return Err(PageError::Material(material));
+        }
+        Ok(view)
+    }
+
+    /// The material of the primitive in `slot`.
+    #[must_use]
+    pub fn material(&self, slot: Slot) -> u16 {
+        if let [one] = self.materials {
+            return *one;
+        }
+        let before = match slot.kind() {
+            Kind::Triangle => 0,
+            Kind::Sphere => self.triangles.len() * BLOCK,
+            Kind::Cone => (self.triangles.len() + self.spheres.len()) * BLOCK,
+        };
+        self.materials[before + slot.number()]
+    }
+}
+
+/// Checks that children come after their parents, that each has one parent, that none is below [`DEPTH_MAX`], and
+/// `leaf` of what is no inner node. `level` is scratch, one byte a node.
+pub(crate) fn check_nodes(
+    nodes: &[Node],
+    level: &mut [u8],
+    leaf: impl Fn(Child) -> Result<(), &'static str>,
+) -> Result<(), (usize, &'static str)> {
+    let Some(level) = level.get_mut(..nodes.len()) else {
+        return Err((level.len(), "more nodes than there is scratch for"));
+    };
+    level.fill(0);
+    for (index, node) in nodes.iter().enumerate() {
+        for packed in node.child {
+            let child = Child::unpack(packed);
+            if packed != child.pack() {
+                return Err((index, "an unknown kind of child"));
+            }
+            match child {
+                Child::Inner(next) => {
+                    let next = next as usize;
+                    if next <= index || next >= nodes.len() {
+                        return Err((index, "a child that does not come after it"));
+                    }
+                    if level[next] != 0 {
+                        return Err((index, "a child that has another parent"));
+                    }
+                    level[next] = level[index] + 1;
+                    if usize::from(level[next]) >= DEPTH_MAX {
+                        return Err((index, "too deep"));
+                    }
+                }
+                Child::Unused => {}
+                other => leaf(other).map_err(|what| (index, what))?,
+            }
+        }
+    }
+    Ok(())
+}
