@@ -273,11 +273,10 @@ fn surface_area(
     page_bytes: usize,
 ) -> Result<(Vec<BinaryNode>, Vec<Chunk>), CutError> {
     let stop_at = sah::Settings { stop_at: CHUNK, ..sah::Settings::default() };
-    // A split may cut off a single item, so there is no bound better than the general one; untouched room costs nothing.
-    let mut tops = vec![BinaryNode::EMPTY; sah::nodes_for(items.len())];
+    // Splits may cut off little at a time: where this room ends, a chunk is larger, and nothing else changes.
+    let mut tops = vec![BinaryNode::EMPTY; 4096 + 64 * (items.len() / CHUNK as usize)];
     let used = sah::build(items, &mut tops, &stop_at);
     tops.truncate(used);
-    tops.shrink_to_fit();
 
     let mut rest = items;
     let mut parts = Vec::new();

@@ -1,4 +1,11 @@
 //! The parts of the `hybray` program: import, pack, render, export, reports.
 #![forbid(unsafe_code)]
 
+pub mod build;
+pub mod builtin;
+pub mod export;
+pub mod framing;
+pub mod import;
 pub mod model;
+pub mod nff_material;
+pub mod picture;

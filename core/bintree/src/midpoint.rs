@@ -36,7 +36,7 @@ pub struct Tree<'a> {
 /// Where a cell is split.
 #[must_use]
 pub fn middle(lo: f32, hi: f32) -> f32 {
-    lo * 0.5 + hi * 0.5
+    0.5 * (lo + hi)
 }
 
 /// Builds a tree over the first `count` of `items`.

@@ -37,9 +37,10 @@ pub const fn nodes_for(items: usize) -> usize {
 /// Builds a tree over `items`, which are put in the order of its leaves, into `nodes`; returns how many it used.
 ///
 /// Bounded by the number of items times [`BINARY_DEPTH_MAX`]. Items that no plane separates are split by their order.
+/// Where `nodes` has no room for another split, what is left is a leaf: [`nodes_for`] is always enough.
 ///
 /// # Panics
-/// If `nodes` is shorter than [`nodes_for`] says.
+/// If there are items, and `nodes` is empty.
 pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) -> usize {
     if items.is_empty() {
         return 0;
@@ -61,7 +62,9 @@ pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) 
             let here = used;
             nodes[here] = BinaryNode { aabb, first: part.first, count: part.count, second: 0 };
             used += 1;
-            let Some(left) = split(range, &aabb, part.depth, settings) else {
+            // Each part that waits will take a node.
+            let room = used + waiting + 2 <= nodes.len();
+            let Some(left) = room.then(|| split(range, &aabb, part.depth, settings)).flatten() else {
                 range.sort_unstable_by_key(|item| (item.kind, item.id));
                 break;
             };

@@ -1,3 +1,31 @@
-//! Dispatcher, node, ledger and film: state machines and pure functions.
+//! Dispatcher, node, ledger and film: state machines and pure functions that know no clock, thread or socket.
+//!
+//! A machine has three verbs. `handle` takes in what arrived; `step` does a bounded amount of work; `poll` sends what the
+//! link has room for, and keeps the rest. Time comes in as nanoseconds. The same machines run on threads, under MPI,
+//! on a board and in the simulator.
 #![no_std]
 #![forbid(unsafe_code)]
+
+mod chunk;
+mod dispatcher;
+mod film;
+mod ledger;
+mod master;
+mod node;
+
+pub use chunk::{Shares, chunk};
+pub use dispatcher::{Dispatcher, NodeState, Options};
+pub use film::{Film, FilmError, Fixed, Step, TileState};
+pub use ledger::Balance;
+pub use master::{Master, NodeReport, Outcome, Progress};
+pub use node::{DEPTH_MAX, Node, NodeMemory};
+
+use hybray_link::{Link, Peer};
+use hybray_wire::{MESSAGE_BYTES_MAX, Message, encode};
+
+/// Sends a message without a body; false if there is no room now.
+pub(crate) fn send(link: &mut dyn Link, to: Peer, message: &Message) -> bool {
+    link.send(to, MESSAGE_BYTES_MAX, &mut |room| {
+        encode(message, room, |_| {}).expect("the room for a message is enough for any")
+    })
+}

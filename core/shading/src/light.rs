@@ -57,9 +57,24 @@ impl Light {
     /// Strength falls with the square of the distance.
     pub const FALLOFF: u16 = 1;
 
+    /// What `kind` stands for; a number that stands for nothing is a point.
+    #[must_use]
+    pub const fn kind(&self) -> LightKind {
+        match self.kind {
+            1 => LightKind::Directional,
+            2 => LightKind::Spot,
+            3 => LightKind::Sphere,
+            4 => LightKind::Rectangle,
+            _ => LightKind::Point,
+        }
+    }
+
     /// Shadow rays that one hit sends to this light.
     #[must_use]
     pub fn shadow_rays(&self) -> u32 {
-        if self.kind >= LightKind::Sphere as u32 { u32::from(self.samples.max(1)) } else { 1 }
+        match self.kind() {
+            LightKind::Point | LightKind::Directional | LightKind::Spot => 1,
+            LightKind::Sphere | LightKind::Rectangle => u32::from(self.samples.max(1)),
+        }
     }
 }

@@ -62,6 +62,16 @@ impl Material {
         flags: 0,
     };
 
+    /// What `highlight` stands for; a number that stands for nothing is none.
+    #[must_use]
+    pub const fn highlight(&self) -> Highlight {
+        match self.highlight {
+            1 => Highlight::Phong,
+            2 => Highlight::Blinn,
+            _ => Highlight::None,
+        }
+    }
+
     /// Whether light passes through.
     #[must_use]
     pub fn transmits(&self) -> bool {

@@ -1,3 +1,15 @@
-//! One step of a ray against the pages at hand.
+//! One step of a ray against the pages at hand: it hits and spawns, or it leaves, and what it brings goes to the film.
+//!
+//! A ray carries its weight, so nothing ever comes back to its parent (DESIGN section 4). A hit is a [`HitRecord`] with a
+//! cursor: it stays until it has spawned its last child, one at a time. [`Lane`] finishes a ray depth first in as many
+//! records as rays may be deep, which is what makes progress certain (DESIGN section 2, law 3).
 #![no_std]
 #![forbid(unsafe_code)]
+
+mod hit;
+mod lane;
+mod scene;
+
+pub use hit::{HitRecord, Origin, surface};
+pub use lane::{Lane, Sink, Walker};
+pub use scene::Scene;

@@ -1,3 +1,121 @@
 //! One loop for every machine: receive, step, send, wait.
+//!
+//! A participant is a node, a dispatcher, or both (section 2.2 of POV||Ray puts the dispatcher near the workers); the
+//! host adds its master. Clocks and links come in from outside.
 #![no_std]
 #![forbid(unsafe_code)]
+
+use hybray_link::{Event, Link};
+use hybray_scheduler::{Dispatcher, Master, Node, Outcome, Progress};
+use hybray_wire::{View, decode};
+
+/// How long a participant that has nothing to do waits for something to arrive, nanoseconds.
+const WAIT: u64 = 20_000_000;
+/// Frames taken in before the next look at other work.
+const FRAMES: usize = 64;
+
+/// Takes in what has arrived, at most [`FRAMES`] frames; returns whether there was anything.
+fn receive(link: &mut dyn Link, mut handle: impl FnMut(Arrival<'_>)) -> bool {
+    let mut any = false;
+    for _ in 0..FRAMES {
+        let more = link.receive(&mut |event| match event {
+            Event::Frame { from, bytes } => match decode(bytes) {
+                Ok(view) => handle(Arrival::Message { from, view }),
+                Err(_) => handle(Arrival::Nonsense),
+            },
+            Event::Lost { peer } => handle(Arrival::Lost { peer }),
+        });
+        if !more {
+            break;
+        }
+        any = true;
+    }
+    any
+}
+
+enum Arrival<'a> {
+    Message { from: u16, view: View<'a> },
+    Nonsense,
+    Lost { peer: u16 },
+}
+
+/// Runs a node, and a dispatcher beside it if it has one, until it is told to stop or the host is lost.
+pub fn run_node(
+    node: &mut Node<'_, '_>,
+    mut dispatcher: Option<Dispatcher<'_>>,
+    link: &mut dyn Link,
+    clock: &mut dyn FnMut() -> u64,
+) {
+    while !node.is_stopped() {
+        let now = clock();
+        let mut host_lost = false;
+        let mut busy = receive(link, |arrival| match arrival {
+            Arrival::Message { from, view } => {
+                if let Some(dispatcher) = &mut dispatcher {
+                    dispatcher.handle(from, &view.message, now);
+                }
+                node.handle(&view.message);
+            }
+            Arrival::Lost { peer } => {
+                host_lost |= peer == hybray_link::HOST;
+                if let Some(dispatcher) = &mut dispatcher {
+                    dispatcher.lost(peer);
+                }
+            }
+            Arrival::Nonsense => {}
+        });
+        if host_lost {
+            return;
+        }
+        busy |= node.step(clock);
+        busy |= node.poll(link);
+        if let Some(dispatcher) = &mut dispatcher {
+            dispatcher.poll(link, clock());
+        }
+        if !busy {
+            link.wait(WAIT);
+        }
+    }
+}
+
+/// Runs the master, and a dispatcher beside it if it has one, until the picture has ended. `watch` is called often with how
+/// far it is; when it returns false, the picture is ended as it is.
+pub fn run_master(
+    master: &mut Master<'_>,
+    mut dispatcher: Option<Dispatcher<'_>>,
+    link: &mut dyn Link,
+    clock: &mut dyn FnMut() -> u64,
+    watch: &mut dyn FnMut(Progress) -> bool,
+) -> Outcome {
+    loop {
+        let now = clock();
+        let busy = receive(link, |arrival| match arrival {
+            Arrival::Message { from, view } => {
+                if let Some(dispatcher) = &mut dispatcher {
+                    dispatcher.handle(from, &view.message, now);
+                }
+                master.handle(from, &view);
+            }
+            Arrival::Nonsense => master.refuse(),
+            Arrival::Lost { peer } => {
+                if let Some(dispatcher) = &mut dispatcher {
+                    dispatcher.lost(peer);
+                }
+                master.lost(peer);
+            }
+        });
+        if !watch(master.progress()) {
+            master.stop();
+        }
+        master.poll(link);
+        if let Some(dispatcher) = &mut dispatcher {
+            dispatcher.poll(link, clock());
+        }
+        if let Some(outcome) = master.outcome() {
+            return outcome;
+        }
+        if !busy {
+            link.wait(WAIT);
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! The second test of A.2: the twelve edges of a cell against the pyramid, by equation A.1 without its divisions.
+
+use crate::classify::Outcodes;
+use crate::distances::Distances;
+use crate::pyramid::ADJACENT;
+use crate::{ClipCounts, ClipPyramid};
+use hybray_geometry::{Aabb, UNIT_ROUNDOFF};
+
+/// Planes that face each other. Ahead of the apex, what is outside both is outside a third plane too, so an edge that
+/// goes there already fails equation A.1 for a pair of neighbours; behind it, these must be evaluated as well.
+const FACING: [(usize, usize); 2] = [(0, 1), (2, 3)];
+
+/// Eight roundings: more than two products of sums have.
+const ROUNDED: f32 = 1.0 + 8.0 * UNIT_ROUNDOFF;
+
+/// Whether a ray of the pyramid may touch the cell, of whose vertices each is surely outside some plane and not all
+/// outside the same.
+///
+/// An edge meets the pyramid unless it leaves through one plane before it comes in through another. If none meets it,
+/// the pyramid misses the cell, or passes through the inside of a face, all of it; then each corner of its section with
+/// that face's plane has part of the face's border in the opposite subspace (A, C, F or H). So if the edges are never
+/// seen in one of those four, the cell is outside. If they are seen in all, and the cell is ahead of the apex, its
+/// projection contains P; if it is not, the axis decides, since all rays pass through or none.
+pub(crate) fn may_overlap(
+    pyramid: &ClipPyramid,
+    distances: &Distances,
+    codes: &Outcodes,
+    aabb: &Aabb,
+    counts: &mut ClipCounts,
+) -> bool {
+    let ahead = codes.ahead();
+    // One bit for each of ADJACENT: the subspaces A, C, F and H, in some order.
+    let mut corners = 0u8;
+    for (bit, (i, j)) in ADJACENT.into_iter().enumerate() {
+        corners |= u8::from(codes.maybe[i] & codes.maybe[j] != 0) << bit;
+    }
+    for upper_bit in [1, 2, 4] {
+        for v in (0..8).filter(|v| v & upper_bit == 0) {
+            let edge = Edge::new(distances, codes, v, v | upper_bit);
+            counts.edges += 1;
+            if !edge.misses(ahead, counts) {
+                return true;
+            }
+            for (bit, (i, j)) in ADJACENT.into_iter().enumerate() {
+                if corners >> bit & 1 == 0 && edge.may_leave_both(i, j) {
+                    corners |= 1 << bit;
+                }
+            }
+        }
+    }
+    if corners != 0b1111 {
+        return false;
+    }
+    counts.surrounded += u64::from(ahead);
+    ahead || !axis_misses(pyramid, aabb)
+}
+
+/// A pair of vertices: what the paper calls a and b.
+struct Edge<'a> {
+    distances: &'a Distances,
+    ends: [usize; 2],
+    /// Outcodes of both ends, one bit a plane.
+    sure: [u8; 2],
+    maybe: [u8; 2],
+}
+
+impl<'a> Edge<'a> {
+    fn new(distances: &'a Distances, codes: &Outcodes, v: usize, w: usize) -> Self {
+        let of = |planes: &[u8; 5], vertex: usize| {
+            planes.iter().enumerate().fold(0u8, |code, (plane, mask)| code | (mask >> vertex & 1) << plane)
+        };
+        Self {
+            distances,
+            ends: [v, w],
+            sure: [of(&codes.sure, v), of(&codes.sure, w)],
+            maybe: [of(&codes.maybe, v), of(&codes.maybe, w)],
+        }
+    }
+
+    /// Whether no point of the edge is in the pyramid widened by the margin.
+    ///
+    /// Ends in neighbouring sides (D and B) take one evaluation of A.1; ends in opposite corners (A and H), one for each of
+    /// the two corners that the edge can pass beyond.
+    fn misses(&self, ahead: bool, counts: &mut ClipCounts) -> bool {
+        if self.sure[0] & self.sure[1] != 0 {
+            return true;
+        }
+        let pairs = ADJACENT.iter().chain(if ahead { &[][..] } else { &FACING });
+        for &(i, j) in pairs {
+            for (v, w) in [(0, 1), (1, 0)] {
+                if self.sure[v] >> i & 1 != 0 && self.sure[w] >> j & 1 != 0 {
+                    counts.evaluations += 1;
+                    let (lhs, rhs) = self.products(i, j, v, w, 1.0);
+                    if lhs > rhs * ROUNDED + f32::MIN_POSITIVE {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Whether, between ends that are each inside one of planes `i` and `j`, some point may be outside both, when all is
+    /// taken to be further out by the margin.
+    fn may_leave_both(&self, i: usize, j: usize) -> bool {
+        [(0, 1), (1, 0)].into_iter().any(|(v, w)| {
+            self.maybe[v] >> i & 1 != 0 && self.maybe[w] >> j & 1 != 0 && {
+                let (lhs, rhs) = self.products(i, j, v, w, -1.0);
+                !(lhs * ROUNDED + f32::MIN_POSITIVE < rhs)
+            }
+        })
+    }
+
+    /// Both sides of A.1 multiplied by its denominators, with the margin added `sign` times to each distance: for `v`
+    /// outside plane `i` alone and `w` outside `j` alone, there are points outside both if the first is greater.
+    fn products(&self, i: usize, j: usize, v: usize, w: usize, sign: f32) -> (f32, f32) {
+        let at =
+            |plane: usize, end: usize| self.distances.of[plane][self.ends[end]] + sign * self.distances.margin[plane];
+        (at(i, v) * at(j, w), at(j, v) * at(i, w))
+    }
+}
+
+/// Whether the ray down the middle surely misses the cell, and what slab arithmetic takes for it.
+fn axis_misses(pyramid: &ClipPyramid, aabb: &Aabb) -> bool {
+    const WIDER: f32 = 1.0 + 32.0 * UNIT_ROUNDOFF;
+    let (entry, exit) = pyramid.axis.slab(aabb);
+    exit < 0.0 || entry > exit * WIDER * WIDER
+}

@@ -1,0 +1,327 @@
+//! The fast form: a bundle of rays against a tree of wide nodes.
+//!
+//! A [`Bundle`] (four planes and a near bound, common apex or not) is clipped against eight boxes at once, down through the
+//! directory and its pages, into a cliplist of leaves in the order of their near bounds. Then eight rays at a time go along
+//! it. Bundles with long lists are divided, and rays that are not coherent, or too few, go singly: each way finds the
+//! same hits to the bit, because each only leaves out boxes that a ray does not meet before its best hit, and the tests
+//! are those of `hybray-geometry`.
+
+use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk};
+use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
+use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes};
+use hybray_scene::{BLOCK, Child, DEPTH_MAX, Kind, Node, PageView, Slot, WIDTH};
+
+/// Rays of a bundle at most.
+pub const RAYS_MAX: usize = 256;
+/// Rays that go side by side.
+const GROUP: usize = 8;
+/// Leaves of a cliplist at most: a bundle with more is divided.
+const LIST_MAX: usize = 128;
+/// A bundle of this many rays or fewer is not divided: its rays go singly.
+const DIVIDE_MIN: usize = 16;
+/// Waiting subtrees at most.
+const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
+
+/// A leaf on a cliplist.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leaf {
+    /// No ray of the bundle meets it before this distance.
+    pub near: f32,
+    /// The page that it is in.
+    pub page: u32,
+    /// [`Child::Leaf`], packed.
+    pub child: u32,
+    /// Least corner of its box.
+    pub lo: [f32; 3],
+    /// Greatest corner of its box.
+    pub hi: [f32; 3],
+}
+
+/// What tracing a bundle needs: lent by the caller. About 12 KB.
+#[derive(Clone, Debug)]
+pub struct Scratch {
+    list: [Leaf; LIST_MAX],
+    waiting: [(f32, u32, u32); STACK],
+}
+
+impl Scratch {
+    /// Empty scratch.
+    #[must_use]
+    pub const fn new() -> Self {
+        const NOTHING: Leaf = Leaf { near: 0.0, page: 0, child: 0, lo: [0.0; 3], hi: [0.0; 3] };
+        Self { list: [NOTHING; LIST_MAX], waiting: [(0.0, 0, 0); STACK] }
+    }
+
+    /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet; `None` if there are more than 128.
+    pub fn clip(
+        &mut self,
+        kernels: Kernels,
+        scene: &Resident<'_>,
+        bundle: &Bundle,
+        counts: &mut Counts,
+    ) -> Option<&[Leaf]> {
+        let length = kernels.run(Clip { scene, bundle, scratch: self, counts })?;
+        Some(&self.list[..length])
+    }
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The nearest hit of each of `rays`, into the first of `hits`: those of single walks, to the bit.
+///
+/// Rays that stand together in the slice should be neighbours: it is divided into halves where a bundle does not pay.
+/// `magnitude` bounds all coordinates of the scene. Bounded by the single walks of all rays, and as many clips.
+///
+/// # Panics
+/// If there are more rays than [`RAYS_MAX`], or fewer hits than rays.
+pub fn nearest(
+    kernels: Kernels,
+    scene: &Resident<'_>,
+    magnitude: f32,
+    rays: &[Ray],
+    hits: &mut [Hit],
+    scratch: &mut Scratch,
+    stack: &mut Stack,
+    counts: &mut Counts,
+) {
+    assert!(rays.len() <= RAYS_MAX && rays.len() <= hits.len());
+    kernels.run(Nearest { scene, magnitude, rays, hits, scratch, stack, counts });
+}
+
+struct Nearest<'w, 'a> {
+    scene: &'w Resident<'a>,
+    magnitude: f32,
+    rays: &'w [Ray],
+    hits: &'w mut [Hit],
+    scratch: &'w mut Scratch,
+    stack: &'w mut Stack,
+    counts: &'w mut Counts,
+}
+
+impl Kernel for Nearest<'_, '_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { scene, magnitude, rays, hits, scratch, stack, counts } = self;
+        let mut parts = [(0, 0); 8];
+        parts[0] = (0, rays.len());
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (first, count) = parts[waiting];
+            let part = &rays[first..first + count];
+            let length = if count < GROUP {
+                None
+            } else {
+                Bundle::around(part.iter(), magnitude).and_then(|bundle| clip(simd, scene, &bundle, scratch, counts))
+            };
+            if let Some(length) = length {
+                let list = &mut scratch.list[..length];
+                list.sort_unstable_by(|a, b| a.near.total_cmp(&b.near));
+                let hits = &mut hits[first..first + count];
+                for (rays, hits) in part.chunks(GROUP).zip(hits.chunks_mut(GROUP)) {
+                    group(simd, scene, rays, hits, list, stack, counts);
+                }
+            } else if count > DIVIDE_MIN {
+                // Halves of whole groups.
+                let half = (count / 2).next_multiple_of(GROUP);
+                parts[waiting] = (first + half, count - half);
+                parts[waiting + 1] = (first, half);
+                waiting += 2;
+            } else {
+                for (ray, hit) in part.iter().zip(&mut hits[first..first + count]) {
+                    *hit = Walk::<false> { scene, ray, stack, counts }.run(simd);
+                }
+            }
+        }
+    }
+}
+
+struct Clip<'w, 'a> {
+    scene: &'w Resident<'a>,
+    bundle: &'w Bundle,
+    scratch: &'w mut Scratch,
+    counts: &'w mut Counts,
+}
+
+impl Kernel for Clip<'_, '_> {
+    type Output = Option<usize>;
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Option<usize> {
+        let length = clip(simd, self.scene, self.bundle, self.scratch, self.counts)?;
+        self.scratch.list[..length].sort_unstable_by(|a, b| a.near.total_cmp(&b.near));
+        Some(length)
+    }
+}
+
+/// The directory counts as a page of this number.
+const DIRECTORY: u32 = u32::MAX;
+
+/// Leaves that the bundle meets, in no order; how many, or `None` if they do not fit the list.
+#[inline(always)]
+fn clip<S: Simd>(
+    simd: S,
+    scene: &Resident<'_>,
+    bundle: &Bundle,
+    scratch: &mut Scratch,
+    counts: &mut Counts,
+) -> Option<usize> {
+    if scene.directory.nodes.is_empty() {
+        return Some(0);
+    }
+    let Scratch { list, waiting } = scratch;
+    let mut length = 0;
+    waiting[0] = (0.0, Child::Inner(0).pack(), DIRECTORY);
+    let mut top = 1;
+    while top > 0 {
+        top -= 1;
+        let (_, packed, page) = waiting[top];
+        let (node, page): (&Node, u32) = match Child::unpack(packed) {
+            Child::Inner(index) if page == DIRECTORY => (&scene.directory.nodes[index as usize], page),
+            Child::Inner(index) => (&scene.pages[page as usize].nodes[index as usize], page),
+            Child::Page(page) => {
+                counts.pages += 1;
+                (&scene.pages[page as usize].nodes[0], page)
+            }
+            Child::Leaf { .. } | Child::Unused => continue,
+        };
+        counts.nodes += 1;
+        let (mut met, near) = bundle.meets(simd, &node.lo, &node.hi);
+        while met != 0 {
+            let slot = met.trailing_zeros() as usize & (WIDTH - 1);
+            met &= met - 1;
+            let child = node.child[slot];
+            if matches!(Child::unpack(child), Child::Leaf { .. }) {
+                let corner = |c: &[[f32; WIDTH]; 3]| [c[0][slot], c[1][slot], c[2][slot]];
+                *list.get_mut(length)? =
+                    Leaf { near: near[slot], page, child, lo: corner(&node.lo), hi: corner(&node.hi) };
+                length += 1;
+            } else {
+                waiting[top] = (near[slot], child, page);
+                top += 1;
+            }
+        }
+    }
+    Some(length)
+}
+
+/// Up to eight rays along a cliplist.
+#[inline(always)]
+fn group<S: Simd>(
+    simd: S,
+    scene: &Resident<'_>,
+    rays: &[Ray],
+    hits: &mut [Hit],
+    list: &[Leaf],
+    stack: &mut Stack,
+    counts: &mut Counts,
+) {
+    // Lanes without a ray repeat the last one.
+    let kernels: [RayKernel; GROUP] = core::array::from_fn(|i| RayKernel::new(&rays[i.min(rays.len() - 1)]));
+    let Some(lanes) = ray_lanes(simd.splat8(0.0), &kernels) else {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = Walk::<false> { scene, ray, stack, counts }.run(simd);
+        }
+        return;
+    };
+    let mut best: [Hit; GROUP] = core::array::from_fn(|i| Hit::none(rays[i.min(rays.len() - 1)].t_max));
+    let mut farthest = simd.load8(&best.map(|hit| hit.candidate.t));
+    let mut stop = greatest(&best);
+    for leaf in list {
+        if leaf.near > stop {
+            break;
+        }
+        let corner = |c: [f32; 3]| c.map(|x| simd.splat8(x));
+        let (near, far) = lanes.own_slab(&corner(leaf.lo), &corner(leaf.hi));
+        let near = near.or_greater(lanes.t_min);
+        let met = (near.le(far) & near.le(farthest)).bits();
+        if met == 0 {
+            continue;
+        }
+        let page = &scene.pages[leaf.page as usize];
+        if self::leaf(simd, &lanes, &kernels, page, leaf, met, &mut best, counts) {
+            farthest = simd.load8(&best.map(|hit| hit.candidate.t));
+            stop = greatest(&best);
+        }
+    }
+    hits.copy_from_slice(&best[..hits.len()]);
+}
+
+fn greatest(hits: &[Hit; GROUP]) -> f32 {
+    hits.iter().fold(0.0, |m, hit| if hit.candidate.t > m { hit.candidate.t } else { m })
+}
+
+/// Tests the rays in `met` against every primitive of a leaf; whether any best hit changed.
+#[inline(always)]
+fn leaf<S: Simd>(
+    simd: S,
+    lanes: &LaneRay<S::F8>,
+    kernels: &[RayKernel; GROUP],
+    page: &PageView<'_>,
+    leaf: &Leaf,
+    met: u32,
+    best: &mut [Hit; GROUP],
+    counts: &mut Counts,
+) -> bool {
+    let Child::Leaf { kind, start, count } = Child::unpack(leaf.child) else { return false };
+    let (start, count) = (start as usize, count as usize);
+    counts.blocks += count as u64;
+    let mut changed = false;
+    let mut keep = |t: S::F8, hit: u32, id: u32, number: usize| {
+        let mut hit = hit & met & lanes.t_min.le(t).bits();
+        if hit == 0 {
+            return;
+        }
+        let t = t.to_array();
+        while hit != 0 {
+            let lane = hit.trailing_zeros() as usize & (GROUP - 1);
+            hit &= hit - 1;
+            let candidate = Candidate { t: t[lane], id };
+            if candidate.precedes(&best[lane].candidate) {
+                best[lane] = Hit { candidate, page: leaf.page, slot: Slot::new(kind, number) };
+                changed = true;
+            }
+        }
+    };
+    match kind {
+        Kind::Triangle => {
+            for (i, block) in page.triangles[start..start + count].iter().enumerate() {
+                for lane in 0..BLOCK {
+                    if lane > 0 && block.id[lane] == block.id[lane - 1] {
+                        break;
+                    }
+                    let v = block.v.map(|vertex| vertex.map(|axis| simd.splat8(axis[lane])));
+                    let (t, hit) = triangle_lanes(lanes, &v);
+                    keep(t, hit, block.id[lane], (start + i) * BLOCK + lane);
+                }
+            }
+        }
+        Kind::Sphere => {
+            for (i, block) in page.spheres[start..start + count].iter().enumerate() {
+                for lane in 0..BLOCK {
+                    if lane > 0 && block.id[lane] == block.id[lane - 1] {
+                        break;
+                    }
+                    let centre = block.centre.map(|axis| simd.splat8(axis[lane]));
+                    let (t, hit) = sphere_lanes(lanes, &centre, simd.splat8(block.radius[lane]));
+                    keep(t, hit, block.id[lane], (start + i) * BLOCK + lane);
+                }
+            }
+        }
+        Kind::Cone => {
+            for (i, cone) in page.cones[start..start + count].iter().enumerate() {
+                for lane in (0..GROUP).filter(|lane| met >> lane & 1 != 0) {
+                    if let Some(candidate) = cone.get().hit(&kernels[lane], cone.id, &best[lane].candidate) {
+                        best[lane] = Hit { candidate, page: leaf.page, slot: Slot::new(kind, start + i) };
+                        changed = true;
+                    }
+                }
+            }
+        }
+    }
+    changed
+}

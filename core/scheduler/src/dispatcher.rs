@@ -1,0 +1,285 @@
+//! The dispatcher: hands out runs of tiles (POV||Ray, section 2).
+//!
+//! It needs to know nothing but how many tiles there are, so it can run on a node near the workers (section 2.2). Each node
+//! has its next run before it ends the last. T, the nodes' rates and the least useful run are learned on the way.
+
+use crate::chunk::{Shares, chunk};
+use crate::send;
+use hybray_link::{Link, Peer};
+use hybray_wire::Message;
+
+/// Runs that a node has at a time: one in work, and the next.
+const AHEAD: usize = 2;
+/// Tiles that wait to be given out again.
+const AGAIN_MAX: usize = 64;
+/// T before anything is known (Pandzic and Magnenat-Thalmann, by way of POV||Ray's conclusions).
+const SPREAD_START: f32 = 2.5;
+/// What a learned T may be.
+const SPREAD_RANGE: (f32, f32) = (1.0, 8.0);
+/// A run should take this many times as long as its messages.
+const OVERHEAD_FACTOR: u64 = 8;
+
+/// What may be chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// T; learned if `None`.
+    pub spread: Option<f32>,
+    /// Least tiles of a run; learned if `None`.
+    pub atomic: Option<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Run {
+    first: u32,
+    count: u32,
+    epoch: u16,
+}
+
+type Runs = heapless::Deque<Run, AHEAD>;
+
+/// What the dispatcher knows of a node: one for each peer is lent to it.
+#[derive(Clone, Debug, Default)]
+pub struct NodeState {
+    here: bool,
+    lost: bool,
+    /// Has been told that nothing is left.
+    told: bool,
+    /// Runs in its hands, the oldest first.
+    runs: Runs,
+    tiles_done: u64,
+    nanoseconds: u64,
+    /// When its first run was sent, to learn what a message costs.
+    first_sent_at: u64,
+    measured: bool,
+}
+
+/// The machine. Memory is lent: `nodes` has one entry for each peer of the link, the host's (unused) included.
+pub struct Dispatcher<'m> {
+    nodes: &'m mut [NodeState],
+    options: Options,
+    /// Tiles of the picture; 0 until it begins.
+    tiles: u32,
+    /// First tile that was never given out.
+    next: u32,
+    again: heapless::Deque<Run, AGAIN_MAX>,
+    /// Least and greatest cost of a tile in any run, nanoseconds.
+    cheapest: u64,
+    dearest: u64,
+    runs_done: u32,
+    /// Least time that a run's messages were seen to take.
+    overhead: u64,
+    asked: bool,
+}
+
+impl<'m> Dispatcher<'m> {
+    /// Waits for a picture and for nodes.
+    #[must_use]
+    pub fn new(nodes: &'m mut [NodeState], options: Options) -> Self {
+        nodes.fill(NodeState::default());
+        Self {
+            nodes,
+            options,
+            tiles: 0,
+            next: 0,
+            again: heapless::Deque::new(),
+            cheapest: u64::MAX,
+            dearest: 0,
+            runs_done: 0,
+            overhead: u64::MAX,
+            asked: false,
+        }
+    }
+
+    /// Takes in a message; those for other machines are passed over.
+    pub fn handle(&mut self, from: Peer, message: &Message, now: u64) {
+        match *message {
+            Message::Begin(frame) => {
+                self.tiles = hybray_wire::TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
+                self.next = 0;
+            }
+            Message::Hello { .. } => {
+                if let Some(node) = self.nodes.get_mut(usize::from(from)) {
+                    node.here = !node.lost;
+                }
+            }
+            Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
+            Message::Again { tile, epoch } => {
+                match self.again.back_mut() {
+                    Some(run) if run.first + run.count == tile && run.epoch == epoch => run.count += 1,
+                    // What does not fit stays unfinished, and the master names it when it looks again.
+                    _ => drop(self.again.push_back(Run { first: tile, count: 1, epoch })),
+                }
+                self.nodes.iter_mut().for_each(|node| node.told = false);
+            }
+            _ => {}
+        }
+    }
+
+    /// A peer is gone: what it had is given to others, under a new epoch.
+    pub fn lost(&mut self, peer: Peer) {
+        if let Some(node) = self.nodes.get_mut(usize::from(peer)) {
+            node.here = false;
+            node.lost = true;
+            for run in node.runs.iter_mut() {
+                run.epoch = run.epoch.saturating_add(1);
+            }
+        }
+    }
+
+    fn done(&mut self, from: Peer, first: u32, count: u32, nanoseconds: u64, now: u64) {
+        let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        let Some(&run) = node.runs.front() else { return };
+        if (run.first, run.count) != (first, count) {
+            return;
+        }
+        node.runs.pop_front();
+        node.tiles_done += u64::from(count);
+        node.nanoseconds += nanoseconds;
+        if !node.measured {
+            node.measured = true;
+            let round_trip = now.saturating_sub(node.first_sent_at);
+            self.overhead = self.overhead.min(round_trip.saturating_sub(nanoseconds));
+        }
+        self.runs_done += 1;
+        let cost = nanoseconds / u64::from(count.max(1));
+        self.cheapest = self.cheapest.min(cost);
+        self.dearest = self.dearest.max(cost);
+    }
+
+    /// T as it is now.
+    #[must_use]
+    pub fn spread(&self) -> f32 {
+        let nodes = self.nodes.iter().filter(|n| n.here).count() as u32;
+        self.options.spread.unwrap_or(if self.runs_done < 2 * nodes || self.cheapest == 0 {
+            SPREAD_START
+        } else {
+            (self.dearest as f32 / self.cheapest as f32).clamp(SPREAD_RANGE.0, SPREAD_RANGE.1)
+        })
+    }
+
+    /// Least tiles of a run as it is now: as many as take [`OVERHEAD_FACTOR`] times the time of their messages, but few
+    /// enough that each node could have several.
+    #[must_use]
+    pub fn atomic(&self) -> u32 {
+        if let Some(atomic) = self.options.atomic {
+            return atomic.max(1);
+        }
+        let (tiles, nanoseconds) =
+            self.nodes.iter().fold((0, 0), |(t, n), node| (t + node.tiles_done, n + node.nanoseconds));
+        let nodes = self.nodes.iter().filter(|n| n.here).count().max(1) as u32;
+        let most = (self.tiles / (16 * nodes)).max(1);
+        if tiles == 0 || self.overhead == u64::MAX {
+            return most.min(4);
+        }
+        let cost = (nanoseconds / tiles).max(1);
+        let wanted = (self.overhead.saturating_mul(OVERHEAD_FACTOR) / cost).min(u64::from(most)) as u32;
+        // Four tiles from a multiple of four on are a square, and a square is a bundle.
+        wanted.max(1).next_multiple_of(if wanted >= 4 { 4 } else { 1 })
+    }
+
+    /// Whether every tile was given out and every run is done.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.tiles > 0
+            && self.next == self.tiles
+            && self.again.is_empty()
+            && self.nodes.iter().all(|node| node.runs.is_empty())
+    }
+
+    /// Whether there is nobody left to give work to.
+    #[must_use]
+    pub fn is_abandoned(&self) -> bool {
+        self.nodes.iter().any(|n| n.lost) && !self.nodes.iter().any(|n| n.here)
+    }
+
+    fn relative_rate(&self, peer: usize) -> f32 {
+        let rate = |n: &NodeState| n.tiles_done as f32 / n.nanoseconds as f32;
+        let known = |n: &&NodeState| n.here && n.tiles_done > 0 && n.nanoseconds > 0;
+        let (sum, count) =
+            self.nodes.iter().filter(known).fold((0.0, 0.0), |(sum, count), n| (sum + rate(n), count + 1.0));
+        let node = &self.nodes[peer];
+        if count > 0.0 && known(&node) { rate(node) * count / sum } else { 1.0 }
+    }
+
+    /// Whether the last tiles are better left to others: this node is so much slower than the mean that those who are
+    /// at work would be through with them first.
+    fn too_slow_for_the_end(&self, peer: usize) -> bool {
+        let at_work = self.nodes.iter().filter(|n| n.here && !n.runs.is_empty()).count();
+        let left = self.tiles - self.next;
+        let rate = self.relative_rate(peer);
+        at_work > 0 && self.nodes[peer].runs.is_empty() && rate * (left as f32) < at_work as f32 * 0.5 && rate < 0.5
+    }
+
+    /// The next run for a node: what others lost or the film asks for again first.
+    fn next_run(&mut self, peer: usize) -> Option<Run> {
+        if let Some(run) = self.again.pop_front() {
+            return Some(run);
+        }
+        if let Some(run) = self.nodes.iter_mut().filter(|n| n.lost).find_map(|n| n.runs.pop_front()) {
+            return Some(run);
+        }
+        if self.next == self.tiles || self.too_slow_for_the_end(peer) {
+            return None;
+        }
+        let shares = Shares {
+            tiles: self.tiles - self.next,
+            nodes: self.nodes.iter().filter(|n| n.here).count() as u32,
+            spread: self.spread(),
+            relative_rate: self.relative_rate(peer),
+            atomic: self.atomic(),
+        };
+        let mut count = chunk(&shares);
+        // What is left after this run begins at a square, unless it would be nothing.
+        let end = (self.next + count).next_multiple_of(4).min(self.tiles);
+        if count >= 4 {
+            count = end - self.next;
+        }
+        let run = Run { first: self.next, count, epoch: 0 };
+        self.next += count;
+        Some(run)
+    }
+
+    fn give_back(&mut self, run: Run) {
+        if run.epoch == 0 && run.first + run.count == self.next {
+            self.next = run.first;
+        } else if let Some(node) = self.nodes.iter_mut().find(|n| n.lost && n.runs.len() < AHEAD) {
+            let _ = node.runs.push_front(run);
+        } else {
+            let _ = self.again.push_front(run);
+        }
+    }
+
+    /// Sends runs to nodes that have fewer than two, and tells all when nothing is left. Bounded: two frames a node.
+    pub fn poll(&mut self, link: &mut dyn Link, now: u64) {
+        if self.tiles == 0 {
+            return;
+        }
+        // First one each, then the second: a node's next run is no reason for another to have none.
+        for wanted in 1..=AHEAD {
+            for peer in 0..self.nodes.len() {
+                if !self.nodes[peer].here || self.nodes[peer].runs.len() >= wanted {
+                    continue;
+                }
+                let Some(run) = self.next_run(peer) else { continue };
+                let message = Message::Tiles { first: run.first, count: run.count, epoch: run.epoch };
+                if send(link, peer as Peer, &message) {
+                    let node = &mut self.nodes[peer];
+                    if node.first_sent_at == 0 {
+                        node.first_sent_at = now;
+                    }
+                    let _ = node.runs.push_back(run);
+                    self.asked = true;
+                } else {
+                    self.give_back(run);
+                }
+            }
+        }
+        if self.is_idle() && self.asked {
+            for peer in 0..self.nodes.len() {
+                if self.nodes[peer].here && !self.nodes[peer].told {
+                    self.nodes[peer].told = send(link, peer as Peer, &Message::Finished { tile: u32::MAX });
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! The master: begins a picture, keeps its film, and sees to it that every tile is finished.
+
+use crate::film::Film;
+use crate::send;
+use hybray_link::{HOST, Link, Peer};
+use hybray_wire::{Counts, Frame, Message, VERSION, View};
+
+/// How far a picture is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Tiles finished.
+    pub finished: u32,
+    /// Tiles of the picture.
+    pub tiles: u32,
+}
+
+/// How it ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Every tile is finished.
+    Finished,
+    /// Somebody asked to stop; some tiles may be finished.
+    Stopped,
+    /// This tile's ledger did not come to zero, twice.
+    Unbalanced {
+        /// Its number.
+        tile: u32,
+    },
+    /// A node has another version of the program, or another scene.
+    Stranger {
+        /// Who.
+        peer: Peer,
+    },
+    /// Every node is lost.
+    Abandoned,
+}
+
+/// What a node did, in its own words.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeReport {
+    /// It has reported since the last round began.
+    reported: bool,
+    greeted: bool,
+    lost: bool,
+    /// Rays.
+    pub counts: Counts,
+    /// Tiles that it traced.
+    pub tiles: u32,
+    /// Runs that it was given.
+    pub runs: u32,
+    /// Time spent tracing, nanoseconds.
+    pub busy_nanoseconds: u64,
+}
+
+/// The machine. `nodes` has one entry for each peer, the host's (unused) included.
+pub struct Master<'m> {
+    frame: Frame,
+    film: Film<'m>,
+    nodes: &'m mut [NodeReport],
+    scene_hash: u64,
+    dispatcher: Peer,
+    /// Peers up to this one have been told to begin.
+    begun: usize,
+    /// Peers up to this one have been told to stop; and whether to.
+    stopping: Option<usize>,
+    outcome: Option<Outcome>,
+    /// Tiles from this one on are still to be looked at in this round.
+    looking: Option<u32>,
+    asked_again: bool,
+    refused_frames: u64,
+}
+
+impl<'m> Master<'m> {
+    /// Begins `frame` on `film`; tiles are given out by `dispatcher`.
+    pub fn new(
+        frame: Frame,
+        film: Film<'m>,
+        nodes: &'m mut [NodeReport],
+        scene_hash: u64,
+        dispatcher: Peer,
+    ) -> Self {
+        nodes.fill(NodeReport::default());
+        Self {
+            frame,
+            film,
+            nodes,
+            scene_hash,
+            dispatcher,
+            begun: 0,
+            stopping: None,
+            outcome: None,
+            looking: None,
+            asked_again: false,
+            refused_frames: 0,
+        }
+    }
+
+    /// The film.
+    #[must_use]
+    pub fn film(&self) -> &Film<'m> {
+        &self.film
+    }
+
+    /// What each peer reported; the host's is empty.
+    #[must_use]
+    pub fn reports(&self) -> &[NodeReport] {
+        self.nodes
+    }
+
+    /// Frames that were no messages, or made no sense.
+    #[must_use]
+    pub fn refused_frames(&self) -> u64 {
+        self.refused_frames
+    }
+
+    /// How far it is.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        Progress { finished: self.film.finished(), tiles: self.film.map().len() }
+    }
+
+    /// How it ended, once everybody has been told.
+    #[must_use]
+    pub fn outcome(&self) -> Option<Outcome> {
+        self.outcome.filter(|_| self.stopping == Some(self.nodes.len()))
+    }
+
+    /// Ends the picture as it is.
+    pub fn stop(&mut self) {
+        self.end(Outcome::Stopped);
+    }
+
+    fn end(&mut self, outcome: Outcome) {
+        if self.outcome.is_none() {
+            self.outcome = Some(outcome);
+            self.stopping = Some(1);
+        }
+    }
+
+    /// A frame that is no message arrived.
+    pub fn refuse(&mut self) {
+        self.refused_frames += 1;
+    }
+
+    /// Takes in a message; those for other machines are passed over.
+    pub fn handle(&mut self, from: Peer, view: &View<'_>) {
+        let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        match view.message {
+            Message::Hello { version, scene } => {
+                node.greeted = true;
+                if version != VERSION || scene != self.scene_hash {
+                    self.end(Outcome::Stranger { peer: from });
+                }
+            }
+            Message::Contributions { tile, epoch, width, height, entry } => {
+                if self.film.add(tile, epoch, (width, height), entry, view.body).is_err() {
+                    self.refused_frames += 1;
+                }
+            }
+            Message::Report { counts, tiles, runs, busy_nanoseconds } => {
+                *node = NodeReport { reported: true, counts, tiles, runs, busy_nanoseconds, ..*node };
+                self.look();
+            }
+            _ => {}
+        }
+    }
+
+    /// A peer is gone. Its tiles are given out again by the dispatcher, under a new epoch.
+    pub fn lost(&mut self, peer: Peer) {
+        if let Some(node) = self.nodes.get_mut(usize::from(peer)) {
+            node.lost = true;
+        }
+        let all = self.nodes.iter().skip(1).all(|n| n.lost);
+        if all || (peer == self.dispatcher && peer != HOST) {
+            self.end(Outcome::Abandoned);
+        }
+        self.look();
+    }
+
+    /// When every node that is left has reported, nothing is on the way any more: a report comes after all
+    /// contributions of its sender.
+    fn look(&mut self) {
+        let all = self.nodes.iter().skip(1).all(|n| n.reported || n.lost || !n.greeted);
+        if !all || self.outcome.is_some() || self.looking.is_some() {
+            return;
+        }
+        if self.film.is_finished() {
+            self.end(Outcome::Finished);
+            return;
+        }
+        self.nodes.iter_mut().for_each(|n| n.reported = false);
+        let unfinished = (0..self.film.map().len()).find(|&tile| !self.film.tile_is_finished(tile));
+        match unfinished {
+            Some(tile) if self.asked_again => self.end(Outcome::Unbalanced { tile }),
+            first => {
+                self.asked_again = true;
+                self.looking = first;
+            }
+        }
+    }
+
+    /// Sends what has to be said. Bounded: one message a peer, and 16 tiles to be traced again.
+    pub fn poll(&mut self, link: &mut dyn Link) {
+        while self.begun < self.nodes.len() {
+            // The host comes last: a dispatcher there must not give out what nodes do not know.
+            let peer = if self.begun + 1 < self.nodes.len() { self.begun + 1 } else { 0 };
+            if !self.nodes[peer].lost && !send(link, peer as Peer, &Message::Begin(self.frame)) {
+                break;
+            }
+            self.begun += 1;
+        }
+        for _ in 0..16 {
+            let Some(tile) = self.looking else { break };
+            let epoch = self.film.epoch(tile).saturating_add(1);
+            if !send(link, self.dispatcher, &Message::Again { tile, epoch }) {
+                break;
+            }
+            self.looking = (tile + 1..self.film.map().len()).find(|&next| !self.film.tile_is_finished(next));
+        }
+        if let Some(from) = self.stopping {
+            let mut next = from;
+            while next < self.nodes.len() {
+                if !self.nodes[next].lost && !send(link, next as Peer, &Message::Stop) {
+                    break;
+                }
+                next += 1;
+            }
+            self.stopping = Some(next);
+        }
+    }
+}

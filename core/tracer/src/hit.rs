@@ -1,0 +1,107 @@
+//! From a walk's hit to a surface, and the record that spawns its rays.
+
+use hybray_bintree::cut::FLAT;
+use hybray_bintree::walk::Hit;
+use hybray_geometry::{RayKernel, SurfacePoint, Vec3, gamma};
+use hybray_scene::{BLOCK, Kind, PageView, Slot};
+use hybray_shading::{Surface, unpack_normal};
+use hybray_wire::RayRecord;
+
+/// Whom a ray and its children are traced for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Origin {
+    /// `y * width + x`.
+    pub pixel: u32,
+    /// Number of the tile.
+    pub tile: u32,
+    /// The tile's epoch.
+    pub epoch: u16,
+    /// Sample of the pixel.
+    pub sample: u16,
+}
+
+/// A hit that is spawning its children.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HitRecord {
+    /// Where.
+    pub surface: Surface,
+    /// The weight of the ray that hit.
+    pub weight: [f32; 3],
+    /// The ray that hit.
+    pub id: u64,
+    /// Sum of the ids of the children so far, wrapping: what the ray's ledger entry will add.
+    pub children: u64,
+    /// Next child.
+    pub cursor: u32,
+    /// One past the last child.
+    pub end: u32,
+    /// For whom.
+    pub origin: Origin,
+    /// 1 for a primary ray's hit.
+    pub depth: u8,
+}
+
+const _: () = assert!(size_of::<HitRecord>() <= 160);
+
+impl HitRecord {
+    /// What fills a lane before it is used.
+    pub const EMPTY: Self = Self {
+        surface: Surface {
+            position: Vec3::ZERO,
+            error: Vec3::ZERO,
+            geometric_normal: Vec3::Z,
+            shading_normal: Vec3::Z,
+            shadow_offset: Vec3::ZERO,
+            incoming: Vec3::Z,
+            material: 0,
+            medium: 0,
+        },
+        weight: [0.0; 3],
+        id: 0,
+        children: 0,
+        cursor: 0,
+        end: 0,
+        origin: Origin { pixel: 0, tile: 0, epoch: 0, sample: 0 },
+        depth: 0,
+    };
+}
+
+/// Works out the place of `hit`, found by `ray` in `page`.
+///
+/// The error given to shading is that of the position, and as much again with a rounding of the coordinates for the
+/// test that a ray starting there will be put to.
+#[must_use]
+pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
+    let kernel = RayKernel::new(&ray.ray());
+    let (t, slot) = (hit.candidate.t, hit.slot);
+    let (block, lane) = (slot.number() / BLOCK, slot.number() % BLOCK);
+    let at = |point: SurfacePoint| Surface {
+        position: point.position,
+        error: point.error * 2.0 + point.position.abs() * gamma(4),
+        geometric_normal: point.normal,
+        shading_normal: point.normal,
+        shadow_offset: Vec3::ZERO,
+        incoming: ray.direction.into(),
+        material: page.material(slot),
+        medium: ray.medium,
+    };
+    match slot.kind() {
+        Kind::Triangle => {
+            let triangle = page.triangles[block].get(lane);
+            let point = triangle.surface(&kernel, t);
+            match vertex_normals(page, slot) {
+                Some(packed) => {
+                    let [u, v] = point.uv;
+                    at(point).smooth(triangle.v, packed.map(unpack_normal), [1.0 - u - v, u, v])
+                }
+                None => at(point),
+            }
+        }
+        Kind::Sphere => at(page.spheres[block].get(lane).surface(&kernel, t)),
+        Kind::Cone => at(page.cones[slot.number()].get().surface(&kernel, t)),
+    }
+}
+
+fn vertex_normals(page: &PageView<'_>, slot: Slot) -> Option<[u32; 3]> {
+    page.normals.get(slot.number()).copied().filter(|packed| !packed.contains(&FLAT))
+}

@@ -1,0 +1,897 @@
+//! Hybray's scene file: brings files together and gives cameras, lights, materials and settings, in TOML.
+//!
+//! `docs/SCENE.md` describes it for who writes one; the example there is parsed by a test here. What this file says
+//! goes before what the included files say: cameras, lights, background and settings of theirs count only where it
+//! gives none, and a material of a name that it defines is its own. A scene file cannot include another, so that
+//! nothing can go in circles.
+
+use super::error::{ImportError, did_you_mean, near, quote};
+use super::meshes::Meshes;
+use super::polygon::Polygons;
+use super::toml_values::{Colour, Maybe, Source};
+use super::transform::Transform;
+use super::{Format, builtin_model, mtl, nff, obj, open, validate};
+use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
+use hybray_shading::{Highlight, Light, LightKind, Material};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+
+/// A scene file may be this long (16 MiB): triangles in their thousands belong into an included file.
+const FILE_BYTES_MAX: u64 = 1 << 24;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    settings: Option<SettingsTable>,
+    background: Option<BackgroundTable>,
+    #[serde(default)]
+    camera: Vec<Spanned<CameraTable>>,
+    #[serde(default)]
+    light: Vec<Spanned<LightTable>>,
+    #[serde(default)]
+    material: BTreeMap<String, MaterialTable>,
+    #[serde(default)]
+    include: Vec<Spanned<IncludeTable>>,
+    #[serde(default)]
+    sphere: Vec<Spanned<SphereTable>>,
+    #[serde(default)]
+    cone: Vec<Spanned<ConeTable>>,
+    #[serde(default)]
+    triangle: Vec<Spanned<TriangleTable>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SettingsTable {
+    size: Maybe<Vec<i64>>,
+    spp: Maybe<i64>,
+    depth: Maybe<i64>,
+    cutoff: Maybe<f64>,
+    filter: Maybe<String>,
+    exposure: Maybe<f64>,
+    seed: Maybe<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BackgroundTable {
+    colour: Maybe<Colour>,
+    ambient: Maybe<Colour>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraTable {
+    name: Maybe<String>,
+    eye: Maybe<Vec<f64>>,
+    target: Maybe<Vec<f64>>,
+    up: Maybe<Vec<f64>>,
+    fov: Maybe<f64>,
+    hither: Maybe<f64>,
+    size: Maybe<Vec<i64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightTable {
+    kind: Maybe<String>,
+    position: Maybe<Vec<f64>>,
+    axis: Maybe<Vec<f64>>,
+    angles: Maybe<Vec<f64>>,
+    radius: Maybe<f64>,
+    u: Maybe<Vec<f64>>,
+    v: Maybe<Vec<f64>>,
+    colour: Maybe<Colour>,
+    strength: Maybe<f64>,
+    falloff: Maybe<bool>,
+    samples: Maybe<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MaterialTable {
+    diffuse: Maybe<Colour>,
+    ambient: Maybe<Colour>,
+    emission: Maybe<Colour>,
+    specular: Maybe<Colour>,
+    exponent: Maybe<f64>,
+    highlight: Maybe<String>,
+    mirror: Maybe<Colour>,
+    transmission: Maybe<Colour>,
+    ior: Maybe<f64>,
+    fresnel: Maybe<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct IncludeTable {
+    file: Maybe<String>,
+    translate: Maybe<Vec<f64>>,
+    rotate: Maybe<RotateTable>,
+    scale: Maybe<f64>,
+    material: Maybe<String>,
+    materials: Maybe<BTreeMap<String, Spanned<String>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RotateTable {
+    axis: Maybe<Vec<f64>>,
+    degrees: Maybe<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SphereTable {
+    centre: Maybe<Vec<f64>>,
+    radius: Maybe<f64>,
+    material: Maybe<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConeTable {
+    base: Maybe<Vec<f64>>,
+    base_radius: Maybe<f64>,
+    apex: Maybe<Vec<f64>>,
+    apex_radius: Maybe<f64>,
+    material: Maybe<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TriangleTable {
+    a: Maybe<Vec<f64>>,
+    b: Maybe<Vec<f64>>,
+    c: Maybe<Vec<f64>>,
+    normals: Maybe<Vec<Vec<f64>>>,
+    material: Maybe<String>,
+}
+
+/// Reads a scene file and what it includes.
+pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
+    let file = path.display().to_string();
+    let reader = open(path).map_err(|e| e.into_error(&file))?;
+    let mut bytes = Vec::new();
+    if let Err(error) = reader.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes) {
+        return Err(ImportError::new(&file, format!("cannot be read ({error})"), "check the disk and the file"));
+    }
+    if bytes.len() as u64 > FILE_BYTES_MAX {
+        let remedy = "put primitives into an OBJ or NFF file and include that";
+        return Err(ImportError::new(&file, "a scene file of more than 16 MiB", remedy));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let good = error.utf8_error().valid_up_to();
+        let line = error.as_bytes()[..good].iter().filter(|&&b| b == b'\n').count() as u64 + 1;
+        ImportError::at(&file, line, "not UTF-8 text", "save the file as UTF-8")
+    })?;
+    read(&text, &file, path.parent().unwrap_or(Path::new("")))
+}
+
+/// The same from text; `folder` is where included files are looked for.
+pub(super) fn read(text: &str, file: &str, folder: &Path) -> Result<Model, ImportError> {
+    let source = Source { file, text };
+    let scene: SceneFile = toml::from_str(text).map_err(|error| {
+        let remedy = "see docs/SCENE.md for what a scene file holds";
+        match error.span() {
+            Some(span) => source.error(span, error.message().trim(), remedy),
+            None => ImportError::new(file, error.message().trim(), remedy),
+        }
+    })?;
+    let mut builder =
+        Builder { source, folder, own: BTreeMap::new(), indices: BTreeMap::new(), model: Model::default() };
+    for (name, table) in &scene.material {
+        let material = builder.material(table)?;
+        builder.own.insert(name.clone(), material);
+    }
+    for table in &scene.include {
+        builder.include(table)?;
+    }
+    builder.primitives(&scene)?;
+    builder.own_settings(&scene)?;
+    Ok(builder.model)
+}
+
+struct Builder<'a> {
+    source: Source<'a>,
+    folder: &'a Path,
+    /// Materials that this file defines.
+    own: BTreeMap<String, Material>,
+    /// Where those that are used stand in the model.
+    indices: BTreeMap<String, u16>,
+    model: Model,
+}
+
+impl Builder<'_> {
+    fn include(&mut self, table: &Spanned<IncludeTable>) -> Result<(), ImportError> {
+        let (span, table) = (table.span(), table.get_ref());
+        let file = self.source.needed(&table.file, "file", &span, "\"bunny.obj\"")?;
+        let transform = self.transform(table)?;
+        let mut other = self.included(file)?;
+        transform.apply(&mut other);
+
+        let map = self.materials_of(&mut other, table, file.get_ref())?;
+        let moved = |index: u16| map.get(usize::from(index)).copied().unwrap_or(0);
+        other.meshes.iter_mut().for_each(|m| m.material = moved(m.material));
+        other.spheres.iter_mut().for_each(|s| s.material = moved(s.material));
+        other.cones.iter_mut().for_each(|c| c.material = moved(c.material));
+
+        let model = &mut self.model;
+        model.meshes.append(&mut other.meshes);
+        model.spheres.append(&mut other.spheres);
+        model.cones.append(&mut other.cones);
+        model.lights.append(&mut other.lights);
+        model.cameras.append(&mut other.cameras);
+        model.warnings.append(&mut other.warnings);
+        for (mine, theirs) in [(&mut model.background, other.background), (&mut model.ambient, other.ambient)] {
+            if *mine == [0.0; 3] {
+                *mine = theirs;
+            }
+        }
+        let (mine, theirs) = (&mut model.settings, other.settings);
+        mine.size = mine.size.or(theirs.size);
+        mine.spp = mine.spp.or(theirs.spp);
+        mine.depth = mine.depth.or(theirs.depth);
+        mine.cutoff = mine.cutoff.or(theirs.cutoff);
+        mine.filter = mine.filter.take().or(theirs.filter);
+        mine.exposure = mine.exposure.or(theirs.exposure);
+        mine.seed = mine.seed.or(theirs.seed);
+        let Objects { polygons, spheres, cones, cylinders } = other.objects;
+        model.objects.polygons += polygons;
+        model.objects.spheres += spheres;
+        model.objects.cones += cones;
+        model.objects.cylinders += cylinders;
+        Ok(())
+    }
+
+    /// The model that a name or path stands for.
+    fn included(&self, file: &Spanned<String>) -> Result<Model, ImportError> {
+        let name = file.get_ref().as_str();
+        let fail = |problem: String, remedy: &str| Err(self.source.error(file.span(), problem, remedy));
+        match builtin_model(name) {
+            Ok(Some(model)) => return Ok(model),
+            Ok(None) => {}
+            Err(error) => return fail(format!("{}: {}", quote(name), error.problem()), error.remedy()),
+        }
+        let path = self.folder.join(name);
+        let format = Format::of(&path);
+        if format == Some(Format::Toml) {
+            return fail(format!("{} is a scene file, and they do not nest", quote(name)), "include what it includes");
+        }
+        // Opened once here for the message: a file that is not there is this line's fault.
+        if let Err(opened) = open(&path) {
+            let (problem, remedy) = opened.complaint();
+            return fail(format!("{}: {problem}", quote(name)), &remedy);
+        }
+        match format {
+            Some(Format::Obj) => obj::load(&path),
+            Some(Format::Nff) => nff::load(&path),
+            _ => fail(format!("{} is no OBJ or NFF file", quote(name)), "include .obj, .nff or a built-in scene"),
+        }
+    }
+
+    fn transform(&self, table: &IncludeTable) -> Result<Transform, ImportError> {
+        let mut t = Transform::IDENTITY;
+        let source = &self.source;
+        if let Some(scale) = &table.scale {
+            t.scale = f64::from(source.number(scale, "scale", |s| s > 0.0, "more than 0, for example 2.5")?);
+        }
+        if let Some(shift) = &table.translate {
+            t.shift = source.numbers(shift, "translate", "[1, 0, 2.5]")?.map(f64::from);
+        }
+        if let Some(rotate) = &table.rotate {
+            let (span, rotate) = (rotate.span(), rotate.get_ref());
+            let axis = source.needed(&rotate.axis, "axis", &span, "[0, 1, 0]")?;
+            let degrees = source.needed(&rotate.degrees, "degrees", &span, "90")?;
+            let vector = source.numbers(axis, "axis", "[0, 1, 0]")?.map(f64::from);
+            source.number(degrees, "degrees", |d| d.abs() <= 36_000.0, "-36000 to 36000, for example 90")?;
+            let turn = Transform::turned(vector, *degrees.get_ref());
+            let missing = || source.error(axis.span(), "`axis` has no length", "give it as axis = [0, 1, 0]");
+            t.turn = turn.ok_or_else(missing)?;
+        }
+        Ok(t)
+    }
+
+    /// For each material of an included model its index in this one.
+    fn materials_of(&mut self, other: &mut Model, table: &IncludeTable, file: &str) -> Result<Vec<u16>, ImportError> {
+        if let (Some(one), Some(_)) = (&table.material, &table.materials) {
+            let remedy = "keep the one that you mean";
+            return Err(self.source.error(one.span(), "both `material` and `materials` are given", remedy));
+        }
+        let mut renamed: BTreeMap<&str, u16> = BTreeMap::new();
+        for (old, new) in table.materials.iter().flat_map(|m| m.get_ref()) {
+            let names = || other.materials.iter().map(|m| m.name.as_str());
+            if !names().any(|name| name == old) {
+                let remedy = did_you_mean(&near(old, names()), "leave the entry out");
+                let problem = format!("{} has no material {}", quote(file), quote(old));
+                return Err(self.source.error(new.span(), problem, remedy));
+            }
+            renamed.insert(old, self.own_material(new)?);
+        }
+        let all = table.material.as_ref().map(|name| self.own_material(name)).transpose()?;
+        let mut map = Vec::with_capacity(other.materials.len());
+        for NamedMaterial { name, material } in std::mem::take(&mut other.materials) {
+            let index = match all.or_else(|| renamed.get(name.as_str()).copied()) {
+                Some(index) => index,
+                None if self.own.contains_key(&name) => self.named(&name)?,
+                None => self.push(name, material)?,
+            };
+            map.push(index);
+        }
+        Ok(map)
+    }
+
+    /// Index of a material that this file must define.
+    fn own_material(&mut self, name: &Spanned<String>) -> Result<u16, ImportError> {
+        if !self.own.contains_key(name.get_ref()) {
+            let near = near(name.get_ref(), self.own.keys().map(String::as_str));
+            let remedy = did_you_mean(&near, &format!("add a table [material.{}]", name.get_ref()));
+            let problem = format!("there is no material {}", quote(name.get_ref()));
+            return Err(self.source.error(name.span(), problem, remedy));
+        }
+        self.named(name.get_ref())
+    }
+
+    /// Index of a material of this file, or of the default grey.
+    fn named(&mut self, name: &str) -> Result<u16, ImportError> {
+        if let Some(&index) = self.indices.get(name) {
+            return Ok(index);
+        }
+        let material = self.own.get(name).copied().unwrap_or(mtl::DEFAULT);
+        let index = self.push(name.to_owned(), material)?;
+        self.indices.insert(name.to_owned(), index);
+        Ok(index)
+    }
+
+    fn push(&mut self, name: String, material: Material) -> Result<u16, ImportError> {
+        let index = u16::try_from(self.model.materials.len()).unwrap_or(u16::MAX);
+        if index == u16::MAX {
+            return Err(ImportError::new(self.source.file, "more than 65,535 materials", "use fewer materials"));
+        }
+        self.model.materials.push(NamedMaterial { name, material });
+        Ok(index)
+    }
+
+    fn primitive_material(&mut self, name: &Maybe<String>) -> Result<u16, ImportError> {
+        match name {
+            Some(name) => self.own_material(name),
+            None => self.named("default"),
+        }
+    }
+
+    fn primitives(&mut self, scene: &SceneFile) -> Result<(), ImportError> {
+        for table in &scene.sphere {
+            let (span, table) = (table.span(), table.get_ref());
+            let material = self.primitive_material(&table.material)?;
+            let radius = self.source.needed(&table.radius, "radius", &span, "1")?;
+            let radius = self.source.number(radius, "radius", |r| r > 0.0, "more than 0, for example 1")?;
+            let sphere = Sphere { centre: self.point(&table.centre, "centre", &span)?, radius, material };
+            validate::sphere(&sphere).map_err(|(p, r)| self.source.error(span, p, r))?;
+            self.model.spheres.push(sphere);
+            self.model.objects.spheres += 1;
+        }
+        for table in &scene.cone {
+            let (span, table) = (table.span(), table.get_ref());
+            let material = self.primitive_material(&table.material)?;
+            let radius = |value, key| {
+                let value = self.source.needed(value, key, &span, "1")?;
+                self.source.number(value, key, |r| r >= 0.0, "0 and up, for example 1")
+            };
+            let base_radius = radius(&table.base_radius, "base_radius")?;
+            let apex_radius = radius(&table.apex_radius, "apex_radius")?;
+            let base = self.point(&table.base, "base", &span)?;
+            let apex = self.point(&table.apex, "apex", &span)?;
+            let cone = Cone { base, base_radius, apex, apex_radius, material };
+            validate::cone(&cone).map_err(|(p, r)| self.source.error(span, p, r))?;
+            self.model.cones.push(cone);
+            if base_radius == apex_radius {
+                self.model.objects.cylinders += 1;
+            } else {
+                self.model.objects.cones += 1;
+            }
+        }
+        let (mut meshes, mut polygons) = (Meshes::default(), Polygons::new());
+        for table in &scene.triangle {
+            let (span, table) = (table.span(), table.get_ref());
+            let material = self.primitive_material(&table.material)?;
+            let corners = [
+                self.point(&table.a, "a", &span)?,
+                self.point(&table.b, "b", &span)?,
+                self.point(&table.c, "c", &span)?,
+            ];
+            let mut normals = Vec::new();
+            if let Some(given) = &table.normals {
+                for normal in given.get_ref() {
+                    let normal = Spanned::new(given.span(), normal.clone());
+                    normals.push(self.source.numbers(&normal, "normals", "[[0, 0, 1], [0, 0, 1], [0, 0, 1]]")?);
+                }
+                if normals.len() != 3 {
+                    let problem = format!("`normals` has {} of them", normals.len());
+                    return Err(self.source.error(given.span(), problem, "give one for each of a, b and c"));
+                }
+            }
+            if meshes.add_polygon(&mut polygons, material, &corners, &normals) == 0 {
+                return Err(self.source.error(span, "the triangle has no area", "move one of its corners"));
+            }
+            self.model.objects.polygons += 1;
+        }
+        self.model.meshes.extend(meshes.finish());
+        Ok(())
+    }
+
+    fn point(&self, value: &Maybe<Vec<f64>>, key: &str, table: &Range<usize>) -> Result<[f32; 3], ImportError> {
+        let value = self.source.needed(value, key, table, "[0, 0, 0]")?;
+        self.source.numbers(value, key, "[0, 0, 0]")
+    }
+
+    /// Cameras, lights, background and settings of this file, in place of the included ones.
+    fn own_settings(&mut self, scene: &SceneFile) -> Result<(), ImportError> {
+        let mut cameras: Vec<CameraSpec> = Vec::new();
+        for table in &scene.camera {
+            let camera = self.camera(table, cameras.len())?;
+            if cameras.iter().any(|c| c.name == camera.name) {
+                let problem = format!("two cameras are called {}", quote(&camera.name));
+                return Err(self.source.error(table.span(), problem, "give each its own `name`"));
+            }
+            cameras.push(camera);
+        }
+        if !cameras.is_empty() {
+            self.model.cameras = cameras;
+        }
+        if !scene.light.is_empty() {
+            self.model.lights.clear();
+        }
+        for table in &scene.light {
+            let light = self.light(table)?;
+            self.model.lights.push(light);
+        }
+        if let Some(table) = &scene.background {
+            self.model.background = self.source.colour_or(&table.colour, "colour", self.model.background)?;
+            self.model.ambient = self.source.colour_or(&table.ambient, "ambient", self.model.ambient)?;
+        }
+        if let Some(table) = &scene.settings {
+            self.settings(table)?;
+        }
+        Ok(())
+    }
+
+    fn settings(&mut self, table: &SettingsTable) -> Result<(), ImportError> {
+        let (source, settings) = (&self.source, &mut self.model.settings);
+        if let Some(size) = &table.size {
+            settings.size = Some(source.size(size, "size")?);
+        }
+        if let Some(spp) = &table.spp {
+            settings.spp = Some(source.whole(spp, "spp", 1..65_537, "16")? as u32);
+        }
+        if let Some(depth) = &table.depth {
+            settings.depth = Some(source.whole(depth, "depth", 1..65, "5")? as u32);
+        }
+        if let Some(cutoff) = &table.cutoff {
+            let allowed = |c: f32| (0.0..=1.0).contains(&c);
+            settings.cutoff = Some(source.number(cutoff, "cutoff", allowed, "0 to 1, for example 0.005")?);
+        }
+        if let Some(filter) = &table.filter {
+            let names = ["box", "tent", "gaussian"];
+            settings.filter = Some(one_of(source, filter, "filter", &names)?.to_owned());
+        }
+        if let Some(exposure) = &table.exposure {
+            settings.exposure = Some(source.number(exposure, "exposure", |e| e > 0.0, "more than 0, for example 1")?);
+        }
+        if let Some(seed) = &table.seed {
+            settings.seed = Some(source.whole(seed, "seed", 0..i64::MAX, "1")?);
+        }
+        Ok(())
+    }
+
+    fn camera(&self, table: &Spanned<CameraTable>, count: usize) -> Result<CameraSpec, ImportError> {
+        let (span, table) = (table.span(), table.get_ref());
+        let source = &self.source;
+        let name = match &table.name {
+            Some(name) if name.get_ref().trim().is_empty() => {
+                return Err(source.error(name.span(), "`name` is empty", "give one, for example \"front\""));
+            }
+            Some(name) => name.get_ref().clone(),
+            None => format!("camera{}", count + 1),
+        };
+        let up = match &table.up {
+            Some(up) => source.numbers(up, "up", "[0, 1, 0]")?,
+            None => [0.0, 1.0, 0.0],
+        };
+        let angle = |a: f32| a > 0.0 && a < 180.0;
+        let camera = CameraSpec {
+            name,
+            eye: self.point(&table.eye, "eye", &span)?,
+            target: self.point(&table.target, "target", &span)?,
+            up,
+            fov_y_degrees: source.number_or(
+                &table.fov,
+                "fov",
+                40.0,
+                angle,
+                "more than 0 and less than 180 degrees, for example 40",
+            )?,
+            hither: source.number_or(&table.hither, "hither", 0.0, |h| h >= 0.0, "0 and up")?,
+            size: table.size.as_ref().map(|s| source.size(s, "size")).transpose()?,
+        };
+        validate::camera(&camera).map_err(|(p, r)| source.error(span, p, r))?;
+        Ok(camera)
+    }
+
+    fn light(&self, table: &Spanned<LightTable>) -> Result<Light, ImportError> {
+        let (span, table) = (table.span(), table.get_ref());
+        let source = &self.source;
+        let kinds = ["point", "directional", "spot", "sphere", "rectangle"];
+        let kind = source.needed(&table.kind, "kind", &span, "\"point\"")?;
+        let name = one_of(source, kind, "kind", &kinds)?;
+
+        // Keys that say something of some kinds only; where they are given to others, the file means something else.
+        let given = [
+            ("position", table.position.as_ref().map(Spanned::span), name != "directional"),
+            ("axis", table.axis.as_ref().map(Spanned::span), name == "directional" || name == "spot"),
+            ("angles", table.angles.as_ref().map(Spanned::span), name == "spot"),
+            ("radius", table.radius.as_ref().map(Spanned::span), name == "sphere"),
+            ("u", table.u.as_ref().map(Spanned::span), name == "rectangle"),
+            ("v", table.v.as_ref().map(Spanned::span), name == "rectangle"),
+            ("falloff", table.falloff.as_ref().map(Spanned::span), name != "directional"),
+            ("samples", table.samples.as_ref().map(Spanned::span), name == "sphere" || name == "rectangle"),
+        ];
+        for (key, at, fits) in given {
+            if let (Some(at), false) = (at, fits) {
+                let problem = format!("`{key}` means nothing for a {name} light");
+                return Err(source.error(at, problem, "leave it out, or choose another kind"));
+            }
+        }
+
+        let strength = source.number_or(&table.strength, "strength", 1.0, |s| s >= 0.0, "0 and up, for example 1")?;
+        let colour = source.colour_or(&table.colour, "colour", [1.0; 3])?.map(|c| c * strength);
+        let falls = table.falloff.as_ref().is_some_and(|f| *f.get_ref());
+        let flags = if falls { Light::FALLOFF } else { 0 };
+        let mut light = Light { colour, flags, samples: 1, ..Light::default() };
+        if name != "directional" {
+            light.position = self.point(&table.position, "position", &span)?;
+        }
+        if name == "directional" || name == "spot" {
+            let axis = source.needed(&table.axis, "axis", &span, "[0, -1, 0]")?;
+            let vector: [f32; 3] = source.numbers(axis, "axis", "[0, -1, 0]")?;
+            let unit = super::unit(vector.map(f64::from));
+            let missing = || source.error(axis.span(), "`axis` has no length", "give it as axis = [0, -1, 0]");
+            light.axis = unit.ok_or_else(missing)?.map(|c| c as f32);
+        }
+        match name {
+            "point" => light.kind = LightKind::Point as u32,
+            "directional" => light.kind = LightKind::Directional as u32,
+            "spot" => {
+                light.kind = LightKind::Spot as u32;
+                let angles = source.needed(&table.angles, "angles", &span, "[20, 30]")?;
+                let [inner, outer]: [f32; 2] = source.numbers(angles, "angles", "[20, 30]")?;
+                if !(0.0 <= inner && inner <= outer && outer <= 180.0) {
+                    let remedy = "give degrees from the axis, full light first: angles = [20, 30]";
+                    return Err(source.error(angles.span(), format!("`angles` is [{inner}, {outer}]"), remedy));
+                }
+                let cosine = |degrees: f32| libm::cos(f64::from(degrees) * (std::f64::consts::PI / 180.0)) as f32;
+                (light.cos_inner, light.cos_outer) = (cosine(inner), cosine(outer));
+            }
+            "sphere" => {
+                light.kind = LightKind::Sphere as u32;
+                let radius = source.needed(&table.radius, "radius", &span, "1")?;
+                light.radius = source.number(radius, "radius", |r| r > 0.0, "more than 0, for example 1")?;
+            }
+            _ => {
+                light.kind = LightKind::Rectangle as u32;
+                light.u = self.point(&table.u, "u", &span)?;
+                light.v = self.point(&table.v, "v", &span)?;
+            }
+        }
+        if name == "sphere" || name == "rectangle" {
+            light.samples = match &table.samples {
+                Some(samples) => source.whole(samples, "samples", 1..65_536, "16")? as u16,
+                None => 16,
+            };
+        }
+        validate::light(&light).map_err(|(p, r)| source.error(span, p, r))?;
+        Ok(light)
+    }
+
+    fn material(&self, table: &MaterialTable) -> Result<Material, ImportError> {
+        let source = &self.source;
+        // A surface of which only a mirror or glass is said has no grey under it.
+        let other = table.mirror.is_some() || table.transmission.is_some() || table.emission.is_some();
+        let diffuse =
+            source.colour_or(&table.diffuse, "diffuse", if other { [0.0; 3] } else { mtl::DEFAULT.diffuse })?;
+        let specular = source.colour_or(&table.specular, "specular", [0.0; 3])?;
+        let shines = specular.iter().any(|&c| c > 0.0);
+        let exponent = source.number_or(
+            &table.exponent,
+            "exponent",
+            if shines { 50.0 } else { 0.0 },
+            |e| e >= 0.0,
+            "0 and up, for example 50",
+        )?;
+        let highlight = match &table.highlight {
+            None if shines => Highlight::Blinn,
+            None => Highlight::None,
+            Some(name) => match one_of(source, name, "highlight", &["none", "phong", "blinn"])? {
+                "phong" => Highlight::Phong,
+                "blinn" => Highlight::Blinn,
+                _ => Highlight::None,
+            },
+        };
+        let ior = if table.transmission.is_some() { 1.5 } else { 1.0 };
+        let fresnel = table.fresnel.as_ref().is_some_and(|f| *f.get_ref());
+        Ok(Material {
+            diffuse,
+            ambient: source.colour_or(&table.ambient, "ambient", diffuse)?,
+            emission: source.colour_or(&table.emission, "emission", [0.0; 3])?,
+            specular,
+            mirror: source.colour_or(&table.mirror, "mirror", [0.0; 3])?,
+            transmission: source.colour_or(&table.transmission, "transmission", [0.0; 3])?,
+            exponent,
+            ior: source.number_or(&table.ior, "ior", ior, |i| i > 0.0, "more than 0, for example 1.5")?,
+            highlight: highlight as u32,
+            flags: if fresnel { Material::FRESNEL } else { 0 },
+        })
+    }
+}
+
+/// The one of `names` that `value` is.
+fn one_of<'n>(
+    source: &Source<'_>,
+    value: &Spanned<String>,
+    key: &str,
+    names: &[&'n str],
+) -> Result<&'n str, ImportError> {
+    if let Some(name) = names.iter().find(|name| *name == value.get_ref()) {
+        return Ok(name);
+    }
+    let all: Vec<String> = names.iter().map(|n| format!("\"{n}\"")).collect();
+    let remedy = format!("give one of {}", all.join(", "));
+    Err(source.error(value.span(), format!("`{key}` is {}", quote(value.get_ref())), remedy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::Folder;
+    use super::*;
+
+    fn import(text: &str) -> Result<Model, String> {
+        let folder = Folder::new(&[
+            ("two.obj", "mtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 3 2 1\n"),
+            ("two.mtl", "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n"),
+            (
+                "ball.nff",
+                "b 0.5 0.5 0.5\nv from 0 0 9 at 0 0 0 up 0 1 0 angle 30\nl 1 2 3\nf 1 1 1 1 0 0 0 1\ns 1 0 0 1\n",
+            ),
+            ("bad.obj", "v 0 0 0\nf 1 2 3\n"),
+            ("other.toml", ""),
+        ]);
+        let model = read(text, "s.toml", folder.path()).map_err(|e| e.to_string())?;
+        assert_eq!(validate::validate(&model), Ok(()));
+        Ok(model)
+    }
+
+    /// The example of the documentation says what its text says.
+    #[test]
+    fn the_documented_example() {
+        let page = include_str!("../../../docs/SCENE.md");
+        let text = page.split("```").find_map(|part| part.strip_prefix("toml\n")).expect("an example");
+        let m = import(text).expect("reads");
+        assert!(m.warnings.is_empty(), "{:?}", m.warnings);
+        assert_eq!(
+            m.settings,
+            crate::model::Settings {
+                size: Some([640, 480]),
+                spp: Some(16),
+                depth: Some(5),
+                cutoff: Some(0.005),
+                filter: Some("tent".to_owned()),
+                exposure: Some(1.0),
+                seed: Some(1),
+            }
+        );
+        assert_eq!(m.ambient, [0.05; 3]);
+        let cameras: Vec<_> = m.cameras.iter().map(|c| (c.name.as_str(), c.eye, c.fov_y_degrees, c.size)).collect();
+        let expected = [("front", [0.0, 2.0, 8.0], 40.0, None), ("above", [0.0, 12.0, 0.5], 40.0, Some([400, 400]))];
+        assert_eq!(cameras, expected);
+        let lights: Vec<_> = m.lights.iter().map(|l| (l.kind, l.samples, l.flags)).collect();
+        assert_eq!(lights, [(1, 1, 0), (4, 16, Light::FALLOFF)]);
+        // spd:balls:2 has 91 spheres and a square; one sphere, cone and triangle are the file's own.
+        assert_eq!((m.spheres.len(), m.cones.len(), m.objects.polygons), (92, 1, 2));
+        assert_eq!(m.materials[usize::from(m.spheres[91].material)].name, "glass");
+    }
+
+    #[test]
+    fn what_each_light_becomes() {
+        let check = |text: &str, expected: Light| {
+            let m = import(&format!("[[light]]\n{text}")).expect(text);
+            assert_eq!(m.lights, [expected], "{text}");
+        };
+        let light = |kind: LightKind| Light { colour: [1.0; 3], kind: kind as u32, samples: 1, ..Light::default() };
+        let position = [1.0, 2.0, 3.0];
+        check("kind = 'point'\nposition = [1, 2, 3]", Light { position, ..light(LightKind::Point) });
+        check(
+            "kind = 'directional'\naxis = [0, -3, 0]",
+            Light { axis: [0.0, -1.0, 0.0], ..light(LightKind::Directional) },
+        );
+        check(
+            "kind = 'spot'\nposition = [1, 2, 3]\naxis = [0, 0, 2]\nangles = [0, 90]\ncolour = [1, 0.5, 0]\nstrength = 2",
+            Light {
+                position,
+                axis: [0.0, 0.0, 1.0],
+                cos_inner: 1.0,
+                cos_outer: libm::cos(std::f64::consts::FRAC_PI_2) as f32,
+                colour: [2.0, 1.0, 0.0],
+                ..light(LightKind::Spot)
+            },
+        );
+        check(
+            "kind = 'sphere'\nposition = [1, 2, 3]\nradius = 0.5\nfalloff = true\nsamples = 4",
+            Light { position, radius: 0.5, flags: Light::FALLOFF, samples: 4, ..light(LightKind::Sphere) },
+        );
+        check(
+            "kind = 'rectangle'\nposition = [1, 2, 3]\nu = [1, 0, 0]\nv = [0, 1, 0]",
+            Light { position, u: [1.0, 0.0, 0.0], v: [0.0, 1.0, 0.0], samples: 16, ..light(LightKind::Rectangle) },
+        );
+    }
+
+    #[test]
+    fn what_each_material_becomes() {
+        let check = |text: &str, expected: Material| {
+            let text = format!("[material.m]\n{text}\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'");
+            let m = import(&text).expect(&text);
+            assert_eq!((m.materials.len(), m.materials[0].material), (1, expected), "{text}");
+        };
+        let black = Material { diffuse: [0.0; 3], ambient: [0.0; 3], ..mtl::DEFAULT };
+        check("", mtl::DEFAULT);
+        check("diffuse = 0.5\nambient = '#ffffff'", Material { diffuse: [0.5; 3], ambient: [1.0; 3], ..mtl::DEFAULT });
+        check("mirror = [1, 0, 0]", Material { mirror: [1.0, 0.0, 0.0], ..black });
+        check("emission = 3", Material { emission: [3.0; 3], ..black });
+        let glass = Material { transmission: [0.9; 3], ior: 1.5, ..black };
+        check("transmission = 0.9", glass);
+        check("transmission = 0.9\nior = 2\nfresnel = true", Material { ior: 2.0, flags: Material::FRESNEL, ..glass });
+        let (specular, highlight) = ([0.5; 3], Highlight::Blinn as u32);
+        check("specular = 0.5", Material { specular, exponent: 50.0, highlight, ..mtl::DEFAULT });
+        let highlight = Highlight::Phong as u32;
+        check(
+            "specular = 0.5\nexponent = 9\nhighlight = 'phong'",
+            Material { specular, exponent: 9.0, highlight, ..mtl::DEFAULT },
+        );
+    }
+
+    #[test]
+    fn includes_move_and_bring_their_own() {
+        let m = import("[[include]]\nfile = 'ball.nff'\ntranslate = [0, 10, 0]\nscale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }")
+            .expect("reads");
+        assert_eq!((m.spheres[0].centre, m.spheres[0].radius), ([0.0, 12.0, 0.0], 2.0));
+        assert_eq!((m.cameras[0].eye, m.cameras[0].name.as_str()), ([0.0, 10.0, 18.0], "view"));
+        assert_eq!(m.lights[0].position, [-4.0, 12.0, 6.0]);
+        assert_eq!(m.background, [0.5; 3]);
+        assert_eq!(m.objects.spheres, 1);
+
+        let own = "[background]\ncolour = 0.25\n[[camera]]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[[light]]\nkind = 'directional'\naxis = [0, -1, 0]\n";
+        let m = import(&format!("{own}[[include]]\nfile = 'ball.nff'\n")).expect("reads");
+        assert_eq!((m.background, m.cameras.len(), m.lights.len()), ([0.25; 3], 1, 1));
+        assert_eq!(m.cameras[0].name, "camera1");
+    }
+
+    #[test]
+    fn materials_of_includes() {
+        let check = |text: &str, expected: &[(&str, [f32; 3])]| {
+            let m = import(text).expect(text);
+            let found: Vec<_> = m
+                .meshes
+                .iter()
+                .map(|mesh| &m.materials[usize::from(mesh.material)])
+                .map(|m| (m.name.as_str(), m.material.diffuse))
+                .collect();
+            assert_eq!(found, expected, "{text}");
+        };
+        let (red, blue, green) = (("red", [1.0, 0.0, 0.0]), ("blue", [0.0, 0.0, 1.0]), ("green", [0.0, 1.0, 0.0]));
+        let file = "[[include]]\nfile = 'two.obj'\n";
+        let own = "[material.green]\ndiffuse = [0, 1, 0]\n";
+        check(file, &[red, blue]);
+        check(&format!("{own}{file}material = 'green'"), &[green, green]);
+        check(&format!("{own}{file}materials = {{ red = 'green' }}"), &[green, blue]);
+        check(&format!("[material.blue]\ndiffuse = 0.5\n{file}"), &[red, ("blue", [0.5; 3])]);
+        check(&format!("{file}{file}"), &[red, blue, red, blue]);
+    }
+
+    #[test]
+    fn mistakes_name_their_line() {
+        let check = |text: &str, expected: &str| {
+            let error = import(text).expect_err(text);
+            assert!(error.starts_with(&format!("s.toml:{expected}")), "{text}\n{error}");
+            assert!(!error.contains('\n'), "{error}");
+        };
+        check("a = ", "1: ");
+        check("\n[settings", "2: ");
+        check("\ncolor = 1", "2: unknown field `color`");
+        check("[settings]\nsizes = [1, 2]", "2: unknown field `sizes`");
+        check("[settings]\n\nsize = [1]", "3: `size` is [1]; give width and height from 1 to 65536");
+        check("[settings]\nsize = [0, 5]", "2: `size` is [0, 5]");
+        check("[settings]\nsize = 'x'", "2: invalid type: string");
+        check("[settings]\nspp = 0", "2: `spp` is 0; give 1 to 65536, for example 16");
+        check("[settings]\nspp = 1.5", "2: invalid type: float");
+        check("[settings]\ndepth = 65", "2: `depth` is 65; give 1 to 64, for example 5");
+        check("[settings]\ncutoff = nan", "2: `cutoff` is NaN; give 0 to 1");
+        check("[settings]\nfilter = 'Box'", "2: `filter` is `Box`; give one of \"box\", \"tent\", \"gaussian\"");
+        check("[settings]\nexposure = 0", "2: `exposure` is 0");
+        check("[settings]\nseed = -1", "2: `seed` is -1");
+        check("[background]\ncolour = [1, 2]", "2: `colour` has 2 numbers");
+        check("[background]\ncolour = [1, 2, 3, 4]", "2: `colour` has 4 numbers");
+        check("[background]\ncolour = '#12345'", "2: `colour` is `#12345`");
+        check("[background]\ncolour = [0, 0, -1]", "2: `colour` is [0.0, 0.0, -1.0]; give numbers of 0 and up");
+        check("[background]\nambient = inf", "2: `ambient` is [inf, inf, inf]");
+        check("[background]\nambient = true", "2: invalid type: boolean `true`, expected a colour");
+        check("\n[[camera]]\neye = [0, 0, 1]", "2: `target` is missing; add target = [0, 0, 0]");
+        let camera = "[[camera]]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n";
+        check(&format!("{camera}fov = 180"), "4: `fov` is 180; give more than 0 and less than 180");
+        check(&format!("{camera}fov = 1e-60"), "4: `fov` is");
+        check(&format!("{camera}up = [0, 0, 2]"), "1: the camera's up points along its view");
+        check(&format!("{camera}hither = -1"), "4: `hither` is -1");
+        check(&format!("{camera}name = 'a'\n{camera}name = 'a'"), "5: two cameras are called `a`");
+        check(&format!("{camera}name = ''"), "4: `name` is empty");
+        check("[[camera]]\neye = [0, 0]\ntarget = [0, 0, 0]", "2: `eye` has 2 numbers");
+        check("[[camera]]\neye = [0, 0, 1e31]\ntarget = [0, 0, 0]", "2: `eye` holds 1");
+        check("[[light]]", "1: `kind` is missing");
+        check("[[light]]\nkind = 'sun'", "2: `kind` is `sun`; give one of");
+        check("[[light]]\nkind = 'point'", "1: `position` is missing");
+        check(
+            "[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nradius = 1",
+            "4: `radius` means nothing for a point light",
+        );
+        check("[[light]]\nkind = 'directional'\naxis = [0, 0, 0]", "3: `axis` has no length");
+        check(
+            "[[light]]\nkind = 'spot'\nposition = [0, 0, 0]\naxis = [0, 0, 1]\nangles = [30, 20]",
+            "5: `angles` is [30, 20]",
+        );
+        check(
+            "[[light]]\nkind = 'rectangle'\nposition = [0, 0, 0]\nu = [1, 0, 0]\nv = [2, 0, 0]",
+            "1: the light's edges",
+        );
+        check("[[light]]\nkind = 'sphere'\nposition = [0, 0, 0]\nradius = 0", "4: `radius` is 0");
+        check("[[light]]\nkind = 'sphere'\nposition = [0, 0, 0]\nradius = 1\nsamples = 70000", "5: `samples` is 70000");
+        check("[material.m]\nior = 0", "2: `ior` is 0; give more than 0, for example 1.5");
+        check("[material.m]\nhighlight = 'x'", "2: `highlight` is `x`");
+        check("[material.m]\nmirror = -1", "2: `mirror` is [-1.0, -1.0, -1.0]");
+        check("[[include]]", "1: `file` is missing");
+        check("\n[[include]]\nfile = 'twoo.obj'", "3: `twoo.obj`: there is no such file; did you mean `two.obj`?");
+        check("[[include]]\nfile = 'x.stl'", "2: `x.stl`: there is no such file");
+        check("[[include]]\nfile = 'other.toml'", "2: `other.toml` is a scene file, and they do not nest");
+        check("[[include]]\nfile = '.'", "2: `.`: a folder, not a file");
+        check("[[include]]\nfile = 'two.mtl'", "2: `two.mtl` is no OBJ or NFF file");
+        check("[[include]]\nfile = 'spd:bals'", "2: `spd:bals`: there is no built-in scene");
+        let two = "[[include]]\nfile = 'two.obj'\n";
+        check(&format!("{two}scale = 0"), "3: `scale` is 0");
+        check(&format!("{two}scale = -1"), "3: `scale` is -1");
+        check(&format!("{two}rotate = {{ axis = [0, 0, 0], degrees = 1 }}"), "3: `axis` has no length");
+        check(&format!("{two}rotate = {{ degrees = 1 }}"), "3: `axis` is missing");
+        check(&format!("{two}material = 'x'"), "3: there is no material `x`; add a table [material.x]");
+        check(
+            &format!("[material.gold]\n{two}material = 'glod'"),
+            "4: there is no material `glod`; did you mean `gold`?",
+        );
+        check(
+            &format!("[material.m]\n{two}materials = {{ rad = 'm' }}"),
+            "4: `two.obj` has no material `rad`; did you mean `red`?",
+        );
+        check(&format!("[material.m]\n{two}material = 'm'\nmaterials = {{}}"), "4: both `material` and `materials`");
+        check("[[sphere]]\ncentre = [0, 0, 0]\nradius = 0", "3: `radius` is 0");
+        check("[[sphere]]\ncentre = [1e9, 0, 0]\nradius = 1", "1: a radius of 1 around");
+        check(
+            "[[cone]]\nbase = [0, 0, 0]\nbase_radius = 1\napex = [0, 0, 0]\napex_radius = 1",
+            "1: the cone's two ends",
+        );
+        check("[[triangle]]\na = [0, 0, 0]\nb = [1, 1, 1]\nc = [2, 2, 2]", "1: the triangle has no area");
+        check(
+            "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 2, 2]\nnormals = [[0, 0, 1]]",
+            "5: `normals` has 1 of them",
+        );
+        // A mistake in an included file is told of there.
+        let error = import("[[include]]\nfile = 'bad.obj'").expect_err("refused");
+        assert!(error.contains("bad.obj:2: index 2 in `2`"), "{error}");
+    }
+}
