@@ -8,7 +8,9 @@ use hybray_bintree::cut::{self, Cut, CutError, FLAT, Primitives};
 use hybray_bintree::walk::Resident;
 use hybray_bintree::{BinaryNode, Item, midpoint, sah, top};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, DirectoryError, Kind, Line, Node, PAGE_BYTES_MAX, PageEntry, PageError, PageView, Tables};
+use hybray_scene::{
+    Directory, DirectoryError, Kind, Line, Node, PAGE_BYTES_MAX, PageEntry, PageError, PageView, Tables,
+};
 use hybray_shading::pack_normal;
 use rayon::prelude::*;
 
@@ -69,6 +71,19 @@ pub struct Packed {
     pub materials: usize,
 }
 
+const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Adds `bytes` to a hash, eight at a time (FNV-1a over little-endian words, the last one filled up with zeros).
+#[must_use]
+pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
+    bytes.chunks(8).fold(hash, |h, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        // The rotation brings what multiplication moves up back down.
+        (h ^ u64::from_le_bytes(word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+    })
+}
+
 /// Validated pages, to be borrowed by [`Packed::resident`].
 pub struct Pages<'a> {
     packed: &'a Packed,
@@ -86,6 +101,16 @@ impl Packed {
     #[must_use]
     pub fn directory_bytes(&self) -> u64 {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.entries[..])) as u64
+    }
+
+    /// Hash of all pages: equal for equal pages in equal order.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        let pages = self.places.par_iter().map(|&(chunk, first, lines)| {
+            let lines = &self.chunks[chunk as usize][first as usize..][..lines as usize];
+            hash_bytes(HASH_START, bytemuck::cast_slice(lines))
+        });
+        pages.collect::<Vec<_>>().iter().fold(HASH_START, |h, page| hash_bytes(h, &page.to_le_bytes()))
     }
 
     /// How many pages there are.

@@ -9,3 +9,5 @@ pub mod import;
 pub mod model;
 pub mod nff_material;
 pub mod picture;
+pub mod prepare;
+pub mod program;

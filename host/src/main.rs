@@ -1,3 +1,8 @@
 //! The `hybray` program.
 #![forbid(unsafe_code)]
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    hybray::program::main()
+}

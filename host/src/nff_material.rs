@@ -16,11 +16,7 @@ pub fn nff_material(rgb: [f32; 3], kd: f32, ks: f32, shine: f32, t: f32, ior: f3
     let kd = share(kd);
     let ks = share(ks);
     let shine = share(shine);
-    let highlight = if ks > 0.0 && shine > 0.0 {
-        Highlight::Phong
-    } else {
-        Highlight::None
-    };
+    let highlight = if ks > 0.0 && shine > 0.0 { Highlight::Phong } else { Highlight::None };
     Material {
         diffuse: rgb.map(|c| share(kd * share(c))),
         ambient: [0.0; 3],
@@ -29,11 +25,7 @@ pub fn nff_material(rgb: [f32; 3], kd: f32, ks: f32, shine: f32, t: f32, ior: f3
         mirror: [ks; 3],
         transmission: [share(t); 3],
         exponent: shine,
-        ior: if ior.is_finite() && ior > 0.0 {
-            ior
-        } else {
-            1.0
-        },
+        ior: if ior.is_finite() && ior > 0.0 { ior } else { 1.0 },
         highlight: highlight as u32,
         flags: 0,
     }
@@ -41,11 +33,7 @@ pub fn nff_material(rgb: [f32; 3], kd: f32, ks: f32, shine: f32, t: f32, ior: f3
 
 /// 0 or more, and finite.
 fn share(value: f32) -> f32 {
-    if value.is_finite() && value > 0.0 {
-        value
-    } else {
-        0.0
-    }
+    if value.is_finite() && value > 0.0 { value } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -56,24 +44,16 @@ mod tests {
     fn balls_sphere() {
         let m = nff_material([1.0, 0.9, 0.7], 0.5, 0.5, 3.0827, 0.0, 1.0);
         assert_eq!(m.diffuse, [0.5, 0.45, 0.35]);
-        assert_eq!(
-            (m.specular, m.mirror, m.transmission),
-            ([0.5; 3], [0.5; 3], [0.0; 3])
-        );
-        assert_eq!(
-            (m.exponent, m.ior, m.highlight, m.flags),
-            (3.0827, 1.0, Highlight::Phong as u32, 0)
-        );
+        assert_eq!((m.specular, m.mirror, m.transmission), ([0.5; 3], [0.5; 3], [0.0; 3]));
+        assert_eq!((m.exponent, m.ior, m.highlight, m.flags), (3.0827, 1.0, Highlight::Phong as u32, 0));
         assert_eq!((m.ambient, m.emission), ([0.0; 3], [0.0; 3]));
     }
 
     #[test]
     fn a_highlight_wants_both_strength_and_exponent() {
-        for (ks, shine, expected) in [
-            (0.5, 3.0, Highlight::Phong),
-            (0.0, 3.0, Highlight::None),
-            (0.5, 0.0, Highlight::None),
-        ] {
+        for (ks, shine, expected) in
+            [(0.5, 3.0, Highlight::Phong), (0.0, 3.0, Highlight::None), (0.5, 0.0, Highlight::None)]
+        {
             let m = nff_material([1.0; 3], 1.0, ks, shine, 0.0, 1.0);
             assert_eq!(m.highlight, expected as u32, "Ks {ks}, Shine {shine}");
             assert_eq!(m.mirrors(), ks > 0.0);
@@ -89,19 +69,9 @@ mod tests {
 
     #[test]
     fn nonsense_is_tamed() {
-        let m = nff_material(
-            [f32::NAN, -1.0, f32::INFINITY],
-            1.0,
-            -0.5,
-            f32::NAN,
-            f32::NEG_INFINITY,
-            0.0,
-        );
+        let m = nff_material([f32::NAN, -1.0, f32::INFINITY], 1.0, -0.5, f32::NAN, f32::NEG_INFINITY, 0.0);
         assert_eq!(m.diffuse, [0.0; 3]);
-        assert_eq!(
-            (m.specular, m.mirror, m.transmission),
-            ([0.0; 3], [0.0; 3], [0.0; 3])
-        );
+        assert_eq!((m.specular, m.mirror, m.transmission), ([0.0; 3], [0.0; 3], [0.0; 3]));
         assert_eq!((m.exponent, m.ior), (0.0, 1.0));
         let m = nff_material([f32::MAX; 3], f32::MAX, 1.0, 1.0, 0.0, 1.0);
         assert!(m.diffuse.iter().all(|c| c.is_finite()));

@@ -96,7 +96,8 @@ pub fn walls(seed: u64, count: usize) -> Model {
                 p[(axis + 2) % 3] = if v { b[(axis + 2) % 3] } else { a[(axis + 2) % 3] };
                 p
             };
-            let [c00, c10, c11, c01] = [corner(false, false), corner(true, false), corner(true, true), corner(false, true)];
+            let [c00, c10, c11, c01] =
+                [corner(false, false), corner(true, false), corner(true, true), corner(false, true)];
             [[c00, c10, c11], [c00, c11, c01]]
         })
         .collect();

@@ -34,7 +34,8 @@ fn check_model(name: &str, model: &Model, rays: usize) {
         let pages = packed.open().unwrap();
         let scene = pages.resident();
         let mut coverage = vec![Coverage::NONE; source.len() as usize];
-        check(&scene, &mut coverage, &mut vec![0; packed.pages()]).unwrap_or_else(|e| panic!("{name} {settings:?}: {e}"));
+        check(&scene, &mut coverage, &mut vec![0; packed.pages()])
+            .unwrap_or_else(|e| panic!("{name} {settings:?}: {e}"));
         let (mut stack, mut counts) = (Stack::new(), Counts::default());
         for kernels in [Kernels::Portable, Kernels::detect()] {
             for (ray, expected) in &rays {

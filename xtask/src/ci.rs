@@ -9,8 +9,5 @@ use crate::gate::{self, Manner};
 
 /// Runs the gate; prints each step with its time, and last the verdict.
 pub fn run() -> anyhow::Result<ExitCode> {
-    gate::run(Manner {
-        missing_tool_fails: true,
-        stop_at_first_failure: true,
-    })
+    gate::run(Manner { missing_tool_fails: true, stop_at_first_failure: true })
 }

@@ -31,11 +31,7 @@ pub enum Outcome {
 impl Outcome {
     /// Passed or failed by a command's exit status.
     pub fn of(passed: bool, complaint: &str) -> Self {
-        if passed {
-            Self::Ok(String::new())
-        } else {
-            Self::Failed(complaint.to_owned())
-        }
+        if passed { Self::Ok(String::new()) } else { Self::Failed(complaint.to_owned()) }
     }
 }
 
@@ -75,12 +71,7 @@ const STEPS: [Step; 7] = [
 pub fn run(manner: Manner) -> anyhow::Result<ExitCode> {
     let tools = Tools::find();
     let workspace = Workspace::load(&tools)?;
-    let mut gate = Gate {
-        tools: &tools,
-        workspace: &workspace,
-        manner,
-        tests: Counts::default(),
-    };
+    let mut gate = Gate { tools: &tools, workspace: &workspace, manner, tests: Counts::default() };
     let mut results = Vec::new();
     for (name, step) in STEPS {
         println!("\n== {name}");
@@ -98,20 +89,12 @@ pub fn run(manner: Manner) -> anyhow::Result<ExitCode> {
     println!("{}", gate.tests);
     let (verdict, passed) = verdict(&results);
     println!("{verdict}");
-    Ok(if passed {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// One line for each step that ran: name, seconds, outcome.
 fn summary(results: &[(&str, Outcome, Duration)]) -> String {
-    let width = results
-        .iter()
-        .map(|(name, ..)| name.len())
-        .max()
-        .unwrap_or(0);
+    let width = results.iter().map(|(name, ..)| name.len()).max().unwrap_or(0);
     let line = |(name, outcome, time): &(&str, Outcome, Duration)| {
         format!("{name:width$} {:8.1} s  {outcome}", time.as_secs_f32())
     };
@@ -121,11 +104,7 @@ fn summary(results: &[(&str, Outcome, Duration)]) -> String {
 /// The last line, and whether the gate passed. A skipped step is named in it: a pass must not look fuller than it was.
 fn verdict(results: &[(&str, Outcome, Duration)]) -> (String, bool) {
     let names = |wanted: fn(&Outcome) -> bool| {
-        let named: Vec<_> = results
-            .iter()
-            .filter(|(_, outcome, _)| wanted(outcome))
-            .map(|(name, ..)| *name)
-            .collect();
+        let named: Vec<_> = results.iter().filter(|(_, outcome, _)| wanted(outcome)).map(|(name, ..)| *name).collect();
         (!named.is_empty()).then(|| named.join("; "))
     };
     if let Some(failed) = names(|outcome| matches!(outcome, Outcome::Failed(_))) {
@@ -149,21 +128,8 @@ fn clippy(gate: &mut Gate<'_>) -> anyhow::Result<Outcome> {
     if !gate.tools.has("clippy") {
         return Ok(missing("clippy", gate.manner));
     }
-    let passed = gate.tools.run(
-        &[
-            "clippy",
-            "--workspace",
-            "--all-targets",
-            "--",
-            "-D",
-            "warnings",
-        ],
-        &[],
-    )?;
-    Ok(Outcome::of(
-        passed,
-        "cargo clippy --workspace --all-targets -- -D warnings",
-    ))
+    let passed = gate.tools.run(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
+    Ok(Outcome::of(passed, "cargo clippy --workspace --all-targets -- -D warnings"))
 }
 
 fn tests(gate: &mut Gate<'_>) -> anyhow::Result<Outcome> {
@@ -173,28 +139,12 @@ fn tests(gate: &mut Gate<'_>) -> anyhow::Result<Outcome> {
 /// The whole system once more as it is shipped, and by the walk that every processor has: the picture must be the same.
 fn portable_tests(gate: &mut Gate<'_>) -> anyhow::Result<Outcome> {
     let portable = [("HYBRAY_KERNELS", "portable")];
-    count(
-        gate,
-        &[
-            "test",
-            "--release",
-            "--package",
-            "hybray-tests",
-            "--no-fail-fast",
-        ],
-        &portable,
-    )
+    count(gate, &["test", "--release", "--package", "hybray-tests", "--no-fail-fast"], &portable)
 }
 
 fn documentation(gate: &mut Gate<'_>) -> anyhow::Result<Outcome> {
-    let passed = gate.tools.run(
-        &["doc", "--workspace", "--no-deps"],
-        &[("RUSTDOCFLAGS", "-D warnings")],
-    )?;
-    Ok(Outcome::of(
-        passed,
-        "RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps",
-    ))
+    let passed = gate.tools.run(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")])?;
+    Ok(Outcome::of(passed, "RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps"))
 }
 
 fn count(gate: &mut Gate<'_>, arguments: &[&str], env: &[(&str, &str)]) -> anyhow::Result<Outcome> {
@@ -208,18 +158,14 @@ fn judge_tests(passed: bool, counts: Counts) -> Outcome {
     match (passed, counts.passed) {
         (true, 0) => Outcome::Failed("no test ran".to_owned()),
         (true, n) => Outcome::Ok(format!("{n} passed")),
-        (false, _) if counts.failed == 0 => {
-            Outcome::Failed("it does not build, or a test run broke off".to_owned())
-        }
+        (false, _) if counts.failed == 0 => Outcome::Failed("it does not build, or a test run broke off".to_owned()),
         (false, _) => Outcome::Failed(format!("{} tests failed", counts.failed)),
     }
 }
 
 fn missing(tool: &str, manner: Manner) -> Outcome {
     if manner.missing_tool_fails {
-        Outcome::Failed(format!(
-            "no {tool}; get it with: rustup component add {tool}"
-        ))
+        Outcome::Failed(format!("no {tool}; get it with: rustup component add {tool}"))
     } else {
         Outcome::Skipped(format!("no {tool}"))
     }
@@ -231,11 +177,7 @@ mod tests {
 
     fn results(outcomes: &[Outcome]) -> Vec<(&'static str, Outcome, Duration)> {
         let names = ["format", "tidy", "clippy", "tests"];
-        names
-            .into_iter()
-            .zip(outcomes)
-            .map(|(name, outcome)| (name, outcome.clone(), Duration::from_secs(1)))
-            .collect()
+        names.into_iter().zip(outcomes).map(|(name, outcome)| (name, outcome.clone(), Duration::from_secs(1))).collect()
     }
 
     fn check_verdict(outcomes: &[Outcome], expected: (&str, bool)) {
@@ -258,25 +200,14 @@ mod tests {
     #[test]
     fn the_last_line_names_what_failed_or_was_left_out() {
         check_verdict(&[ok(), ok()], ("gate: passed", true));
-        check_verdict(
-            &[ok(), ok(), skipped(), ok()],
-            ("gate: passed, without clippy", true),
-        );
+        check_verdict(&[ok(), ok(), skipped(), ok()], ("gate: passed, without clippy", true));
         check_verdict(&[ok(), failed()], ("gate: FAILED at tidy", false));
-        check_verdict(
-            &[failed(), ok(), skipped(), failed()],
-            ("gate: FAILED at format; tests", false),
-        );
+        check_verdict(&[failed(), ok(), skipped(), failed()], ("gate: FAILED at format; tests", false));
     }
 
     #[test]
     fn the_summary_has_a_line_for_each_step() {
-        let text = summary(&results(&[
-            ok(),
-            Outcome::Ok("8 checks".to_owned()),
-            skipped(),
-            failed(),
-        ]));
+        let text = summary(&results(&[ok(), Outcome::Ok("8 checks".to_owned()), skipped(), failed()]));
         let expected = [
             "format      1.0 s  ok",
             "tidy        1.0 s  ok (8 checks)",
@@ -288,41 +219,17 @@ mod tests {
 
     #[test]
     fn a_run_without_tests_does_not_pass() {
-        let counts = |passed, failed| Counts {
-            passed,
-            failed,
-            ignored: 1,
-        };
-        assert_eq!(
-            judge_tests(true, counts(0, 0)),
-            Outcome::Failed("no test ran".to_owned())
-        );
-        assert_eq!(
-            judge_tests(true, counts(5, 0)),
-            Outcome::Ok("5 passed".to_owned())
-        );
-        assert_eq!(
-            judge_tests(false, counts(5, 2)),
-            Outcome::Failed("2 tests failed".to_owned())
-        );
-        assert!(
-            matches!(judge_tests(false, counts(5, 0)), Outcome::Failed(how) if how.contains("build"))
-        );
+        let counts = |passed, failed| Counts { passed, failed, ignored: 1 };
+        assert_eq!(judge_tests(true, counts(0, 0)), Outcome::Failed("no test ran".to_owned()));
+        assert_eq!(judge_tests(true, counts(5, 0)), Outcome::Ok("5 passed".to_owned()));
+        assert_eq!(judge_tests(false, counts(5, 2)), Outcome::Failed("2 tests failed".to_owned()));
+        assert!(matches!(judge_tests(false, counts(5, 0)), Outcome::Failed(how) if how.contains("build")));
     }
 
     #[test]
     fn a_missing_tool_fails_the_gate_and_is_skipped_in_the_test() {
-        let manner = |missing_tool_fails| Manner {
-            missing_tool_fails,
-            stop_at_first_failure: false,
-        };
-        assert!(matches!(
-            missing("clippy", manner(true)),
-            Outcome::Failed(_)
-        ));
-        assert_eq!(
-            missing("clippy", manner(false)),
-            Outcome::Skipped("no clippy".to_owned())
-        );
+        let manner = |missing_tool_fails| Manner { missing_tool_fails, stop_at_first_failure: false };
+        assert!(matches!(missing("clippy", manner(true)), Outcome::Failed(_)));
+        assert_eq!(missing("clippy", manner(false)), Outcome::Skipped("no clippy".to_owned()));
     }
 }

@@ -10,8 +10,5 @@ use crate::gate::{self, Manner};
 
 /// Runs every step whose tools are present; prints last what each came to.
 pub fn run() -> anyhow::Result<ExitCode> {
-    gate::run(Manner {
-        missing_tool_fails: false,
-        stop_at_first_failure: false,
-    })
+    gate::run(Manner { missing_tool_fails: false, stop_at_first_failure: false })
 }

@@ -35,11 +35,7 @@ pub struct Problem {
 
 impl Problem {
     fn at(path: &str, line: usize, what: impl Into<String>) -> Self {
-        Self {
-            path: path.to_owned(),
-            line,
-            what: what.into(),
-        }
+        Self { path: path.to_owned(), line, what: what.into() }
     }
 
     fn of(path: &str, what: impl Into<String>) -> Self {
@@ -73,11 +69,7 @@ const CHECKS: [Check; 8] = [
 pub fn run() -> anyhow::Result<ExitCode> {
     let outcome = outcome(&Workspace::load(&Tools::find())?)?;
     println!("tidy: {outcome}");
-    Ok(if matches!(outcome, Outcome::Failed(_)) {
-        ExitCode::FAILURE
-    } else {
-        ExitCode::SUCCESS
-    })
+    Ok(if matches!(outcome, Outcome::Failed(_)) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// Runs every check on the workspace as it stands on the disk; prints the problems under the name of their check.
@@ -115,14 +107,8 @@ mod testing {
     /// the last part of its folder.
     pub fn member(folder: &str, uses: &[&str]) -> Member {
         let arrow = |name: &&str| match name.strip_prefix("dev:") {
-            Some(name) => Use {
-                name: name.to_owned(),
-                dev_only: true,
-            },
-            None => Use {
-                name: (*name).to_owned(),
-                dev_only: false,
-            },
+            Some(name) => Use { name: name.to_owned(), dev_only: true },
+            None => Use { name: (*name).to_owned(), dev_only: false },
         };
         Member {
             name: folder.rsplit('/').next().unwrap().to_owned(),

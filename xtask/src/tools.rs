@@ -17,9 +17,7 @@ pub struct Tools {
 impl Tools {
     /// `CARGO` is set by `cargo run`; the plain name serves when the program is started by hand.
     pub fn find() -> Self {
-        Self {
-            cargo: env::var_os("CARGO").unwrap_or_else(|| "cargo".into()),
-        }
+        Self { cargo: env::var_os("CARGO").unwrap_or_else(|| "cargo".into()) }
     }
 
     /// A cargo command that reads nothing from the user.
@@ -50,17 +48,10 @@ impl Tools {
     ///
     /// # Errors
     /// When cargo cannot be started, or its output cannot be read or passed on.
-    pub fn run_tests(
-        &self,
-        arguments: &[&str],
-        env: &[(&str, &str)],
-    ) -> anyhow::Result<(bool, Counts)> {
+    pub fn run_tests(&self, arguments: &[&str], env: &[(&str, &str)]) -> anyhow::Result<(bool, Counts)> {
         announce(arguments, env);
         let mut command = self.cargo(arguments);
-        let mut child = command
-            .envs(env.iter().copied())
-            .stdout(Stdio::piped())
-            .spawn()?;
+        let mut child = command.envs(env.iter().copied()).stdout(Stdio::piped()).spawn()?;
         let mut counts = Counts::default();
         if let Some(output) = child.stdout.take() {
             // Bytes, because a test may print what is not UTF-8.
@@ -79,10 +70,7 @@ impl Tools {
 
 /// Shows a command as it could be typed.
 fn announce(arguments: &[&str], env: &[(&str, &str)]) {
-    let settings: String = env
-        .iter()
-        .map(|(name, value)| format!("{name}='{value}' "))
-        .collect();
+    let settings: String = env.iter().map(|(name, value)| format!("{name}='{value}' ")).collect();
     println!("$ {settings}cargo {}", arguments.join(" "));
 }
 
@@ -100,21 +88,9 @@ pub struct Counts {
 impl Counts {
     /// Reads cargo's `test result: ok. 3 passed; 0 failed; 1 ignored; ...`; any other line is `None`.
     fn of_line(line: &str) -> Option<Self> {
-        let fields = line
-            .trim()
-            .strip_prefix("test result: ")?
-            .split_once(". ")?
-            .1;
-        let field = |name: &str| {
-            fields
-                .split("; ")
-                .find_map(|field| field.strip_suffix(name)?.trim().parse().ok())
-        };
-        Some(Self {
-            passed: field("passed")?,
-            failed: field("failed")?,
-            ignored: field("ignored")?,
-        })
+        let fields = line.trim().strip_prefix("test result: ")?.split_once(". ")?.1;
+        let field = |name: &str| fields.split("; ").find_map(|field| field.strip_suffix(name)?.trim().parse().ok());
+        Some(Self { passed: field("passed")?, failed: field("failed")?, ignored: field("ignored")? })
     }
 }
 
@@ -128,11 +104,7 @@ impl AddAssign for Counts {
 
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "tests: {} passed, {} failed, {} skipped",
-            self.passed, self.failed, self.ignored
-        )
+        write!(f, "tests: {} passed, {} failed, {} skipped", self.passed, self.failed, self.ignored)
     }
 }
 
@@ -141,11 +113,7 @@ mod tests {
     use super::*;
 
     fn check(line: &str, expected: Option<(u64, u64, u64)>) {
-        let expected = expected.map(|(passed, failed, ignored)| Counts {
-            passed,
-            failed,
-            ignored,
-        });
+        let expected = expected.map(|(passed, failed, ignored)| Counts { passed, failed, ignored });
         assert_eq!(Counts::of_line(line), expected, "{line}");
     }
 
@@ -167,16 +135,8 @@ mod tests {
 
     #[test]
     fn counts_add_up_and_read_as_one_line() {
-        let mut sum = Counts {
-            passed: 1,
-            failed: 2,
-            ignored: 3,
-        };
-        sum += Counts {
-            passed: 10,
-            failed: 20,
-            ignored: 30,
-        };
+        let mut sum = Counts { passed: 1, failed: 2, ignored: 3 };
+        sum += Counts { passed: 10, failed: 20, ignored: 30 };
         assert_eq!(sum.to_string(), "tests: 11 passed, 22 failed, 33 skipped");
     }
 }

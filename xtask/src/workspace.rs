@@ -44,8 +44,7 @@ pub struct Use {
 impl Member {
     /// Whether the crate must run without an operating system: the core, the transport trait and the nodes' loop.
     pub fn is_bare(&self) -> bool {
-        self.folder.starts_with("core/")
-            || ["transport/link", "nodes/runner"].contains(&self.folder.as_str())
+        self.folder.starts_with("core/") || ["transport/link", "nodes/runner"].contains(&self.folder.as_str())
     }
 }
 
@@ -58,33 +57,16 @@ impl Workspace {
         let mut ask = tools.cargo(&["metadata", "--no-deps", "--format-version", "1"]);
         let answer = ask.output().context("cargo does not start")?;
         let complaint = String::from_utf8_lossy(&answer.stderr);
-        anyhow::ensure!(
-            answer.status.success(),
-            "cargo metadata: {}",
-            complaint.trim()
-        );
+        anyhow::ensure!(answer.status.success(), "cargo metadata: {}", complaint.trim());
         Self::parse(&answer.stdout)
     }
 
     /// Reads the output of `cargo metadata --no-deps --format-version 1`.
     fn parse(json: &[u8]) -> anyhow::Result<Self> {
-        let raw: Metadata =
-            serde_json::from_slice(json).context("cargo metadata answered in an unknown form")?;
-        let names: Vec<_> = raw
-            .packages
-            .iter()
-            .map(|package| package.name.clone())
-            .collect();
-        let crates = raw
-            .packages
-            .into_iter()
-            .map(|package| package.into_member(&raw.workspace_root, &names))
-            .collect();
-        Ok(Self {
-            root: raw.workspace_root,
-            target: raw.target_directory,
-            crates,
-        })
+        let raw: Metadata = serde_json::from_slice(json).context("cargo metadata answered in an unknown form")?;
+        let names: Vec<_> = raw.packages.iter().map(|package| package.name.clone()).collect();
+        let crates = raw.packages.into_iter().map(|package| package.into_member(&raw.workspace_root, &names)).collect();
+        Ok(Self { root: raw.workspace_root, target: raw.target_directory, crates })
     }
 }
 
@@ -119,37 +101,15 @@ struct Target {
 
 impl Package {
     fn into_member(self, root: &Path, members: &[String]) -> Member {
-        let is_root = |target: &&Target| {
-            target
-                .kind
-                .iter()
-                .any(|kind| kind == "bin" || kind.ends_with("lib"))
-        };
-        let roots = self
-            .targets
-            .iter()
-            .filter(|target| is_root(target) || target.kind == ["proc-macro"]);
+        let is_root = |target: &&Target| target.kind.iter().any(|kind| kind == "bin" || kind.ends_with("lib"));
+        let roots = self.targets.iter().filter(|target| is_root(target) || target.kind == ["proc-macro"]);
         // A crate of the same name from the registry would have no path.
-        let ours = self
-            .dependencies
-            .into_iter()
-            .filter(|used| used.path.is_some() && members.contains(&used.name));
+        let ours = self.dependencies.into_iter().filter(|used| used.path.is_some() && members.contains(&used.name));
         Member {
-            folder: self
-                .manifest_path
-                .parent()
-                .map(|folder| relative(folder, root))
-                .unwrap_or_default(),
+            folder: self.manifest_path.parent().map(|folder| relative(folder, root)).unwrap_or_default(),
             description: self.description.unwrap_or_default(),
-            roots: roots
-                .map(|target| relative(&target.src_path, root))
-                .collect(),
-            uses: ours
-                .map(|used| Use {
-                    dev_only: used.kind.as_deref() == Some("dev"),
-                    name: used.name,
-                })
-                .collect(),
+            roots: roots.map(|target| relative(&target.src_path, root)).collect(),
+            uses: ours.map(|used| Use { dev_only: used.kind.as_deref() == Some("dev"), name: used.name }).collect(),
             name: self.name,
         }
     }
@@ -157,10 +117,7 @@ impl Package {
 
 /// A path below `root`, with `/` on every system.
 pub fn relative(path: &Path, root: &Path) -> String {
-    path.strip_prefix(root)
-        .unwrap_or(path)
-        .to_string_lossy()
-        .replace('\\', "/")
+    path.strip_prefix(root).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
 
 #[cfg(test)]
@@ -190,18 +147,9 @@ mod tests {
         let workspace = Workspace::parse(ANSWER.as_bytes()).unwrap();
         assert_eq!(workspace.target, Path::new("/house/target"));
         let wire = &workspace.crates[0];
-        assert_eq!(
-            (wire.folder.as_str(), wire.description.as_str()),
-            ("core/wire", "Messages")
-        );
-        assert_eq!(
-            wire.roots,
-            ["core/wire/src/lib.rs", "core/wire/src/main.rs"]
-        );
-        let uses = |name: &str, dev_only| Use {
-            name: name.to_owned(),
-            dev_only,
-        };
+        assert_eq!((wire.folder.as_str(), wire.description.as_str()), ("core/wire", "Messages"));
+        assert_eq!(wire.roots, ["core/wire/src/lib.rs", "core/wire/src/main.rs"]);
+        let uses = |name: &str, dev_only| Use { name: name.to_owned(), dev_only };
         assert_eq!(wire.uses, [uses("geometry", false), uses("checks", true)]);
         assert_eq!(workspace.crates[1].description, "");
     }
@@ -214,16 +162,8 @@ mod tests {
 
     #[test]
     fn the_bare_crates_are_the_core_the_trait_and_the_loop() {
-        let bare = |folder: &str| {
-            Member {
-                folder: folder.to_owned(),
-                ..Member::default()
-            }
-            .is_bare()
-        };
+        let bare = |folder: &str| Member { folder: folder.to_owned(), ..Member::default() }.is_bare();
         assert!(bare("core/wire") && bare("transport/link") && bare("nodes/runner"));
-        assert!(
-            !bare("transport/memory") && !bare("nodes/native") && !bare("host") && !bare("xtask")
-        );
+        assert!(!bare("transport/memory") && !bare("nodes/native") && !bare("host") && !bare("xtask"));
     }
 }

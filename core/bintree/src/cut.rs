@@ -6,8 +6,7 @@ use crate::collapse::{Binary, Full, collapse};
 use bytemuck::Zeroable;
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle};
 use hybray_scene::{
-    BLOCK, Child, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, SphereBlock, TriangleBlock,
-    lines_for,
+    BLOCK, Child, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, SphereBlock, TriangleBlock, lines_for,
 };
 
 /// The caller's primitives, by [`Item::id`].
@@ -226,8 +225,7 @@ fn fill<P: Primitives>(
         hi: part.aabb.hi.to_array(),
         ..Zeroable::zeroed()
     };
-    let mut filling =
-        Filling { subject, source, contents, counts: header, smooth: false, bytes_max };
+    let mut filling = Filling { subject, source, contents, counts: header, smooth: false, bytes_max };
     header.nodes = collapse(&mut filling, *part, nodes)? as u32;
     let (counts, smooth) = (filling.counts, filling.smooth);
     header.triangle_blocks = counts.triangle_blocks;

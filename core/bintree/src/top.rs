@@ -37,7 +37,9 @@ impl Builder {
 
     fn push(&mut self, aabb: &Aabb, page: u32) {
         let here = self.nodes.len();
-        if self.closed && let Some(parent) = self.open.pop() {
+        if self.closed
+            && let Some(parent) = self.open.pop()
+        {
             self.nodes[parent].second = here as u32;
         }
         self.nodes.push(TopNode { aabb: *aabb, second: 0, page });

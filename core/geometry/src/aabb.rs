@@ -97,13 +97,7 @@ const WIDEN: f32 = 1.0 + 2.0 * f32::EPSILON;
 /// and such a plane bounds nothing: NaN is dropped by the order of the operands. All operations round monotonely, so a
 /// box that contains another is entered no later and left no earlier.
 #[inline(always)]
-pub fn slab<F: Lanes>(
-    origin: &[F; 3],
-    inverse: &[F; 3],
-    near_planes: &[F; 3],
-    far_planes: &[F; 3],
-    near: F,
-) -> (F, F) {
+pub fn slab<F: Lanes>(origin: &[F; 3], inverse: &[F; 3], near_planes: &[F; 3], far_planes: &[F; 3], near: F) -> (F, F) {
     let mut entry = near;
     let mut exit = near.splat_like(f32::INFINITY);
     for i in 0..3 {

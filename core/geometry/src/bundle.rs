@@ -59,8 +59,7 @@ impl Bundle {
                 slope_hi[i] = slope_hi[i].max(slope);
             }
         }
-        let normals =
-            [u - w * slope_lo[0], w * slope_hi[0] - u, v - w * slope_lo[1], w * slope_hi[1] - v, w];
+        let normals = [u - w * slope_lo[0], w * slope_hi[0] - u, v - w * slope_lo[1], w * slope_hi[1] - v, w];
         let mut offsets = [f32::INFINITY; 5];
         let mut last_origin = f32::NEG_INFINITY;
         let mut reach = magnitude;

@@ -92,7 +92,13 @@ impl Cone {
                 return None;
             }
             let t = t as f32;
-            let t = if t < near { near } else if t > far { far } else { t };
+            let t = if t < near {
+                near
+            } else if t > far {
+                far
+            } else {
+                t
+            };
             let found = Candidate { t, id };
             (t >= ray.t_min && found.precedes(best)).then_some(found)
         })

@@ -40,7 +40,13 @@ impl RayKernel {
     pub fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
         let (ax, ay, az) = (d[0].abs(), d[1].abs(), d[2].abs());
-        let z = if ax > ay { if ax > az { 0 } else { 2 } } else if ay > az { 1 } else { 2 };
+        let z = if ax > ay {
+            if ax > az { 0 } else { 2 }
+        } else if ay > az {
+            1
+        } else {
+            2
+        };
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
         if d[z] < 0.0 {
             core::mem::swap(&mut x, &mut y);

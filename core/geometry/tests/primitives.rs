@@ -44,9 +44,8 @@ fn rays_aimed_at_vertices_and_edges_never_leak() {
         let along = random.signed().abs() * 0.9;
         let target = if round % 2 == 0 { apex } else { apex + (ring[round % 6] - apex) * along };
         let ray = ray(origin, target - origin);
-        let hits = (0..6)
-            .filter(|&i| Triangle { v: [apex, ring[i], ring[(i + 1) % 6]] }.hit(&ray, 0, &FAR).is_some())
-            .count();
+        let hits =
+            (0..6).filter(|&i| Triangle { v: [apex, ring[i], ring[(i + 1) % 6]] }.hit(&ray, 0, &FAR).is_some()).count();
         assert!(hits > 0, "round {round}: {ray:?}");
     }
 }
@@ -138,7 +137,8 @@ fn a_cone_hit_lies_on_its_side_and_in_its_box() {
         let ray = ray(o, cone.base + random.vec() - o);
         if let Some(hit) = cone.hit(&ray, 0, &FAR) {
             hits += 1;
-            let p = Vec3::from_array(ray.origin).as_dvec3() + Vec3::from_array(ray.direction).as_dvec3() * f64::from(hit.t);
+            let p =
+                Vec3::from_array(ray.origin).as_dvec3() + Vec3::from_array(ray.direction).as_dvec3() * f64::from(hit.t);
             let axis = cone.apex.as_dvec3() - cone.base.as_dvec3();
             let height = (p - cone.base.as_dvec3()).dot(axis) / axis.length_squared();
             let across = (p - cone.base.as_dvec3() - axis * height).length();

@@ -132,7 +132,8 @@ pub fn clip<T: Bintree>(
     }
 }
 
-/// What comes of a cell.
+/// What comes of a cell. The halves are as large as they are: nothing here can be boxed, and they live for one call.
+#[allow(clippy::large_enum_variant)]
 enum Step<C> {
     Nothing,
     Leaf(ClipCell<C>),

@@ -51,8 +51,9 @@ pub(crate) fn may_overlap(
     if corners != 0b1111 {
         return false;
     }
-    counts.surrounded += u64::from(ahead);
-    ahead || !axis_misses(pyramid, aabb)
+    let surrounds = ahead || !axis_misses(pyramid, aabb);
+    counts.surrounded += u64::from(surrounds);
+    surrounds
 }
 
 /// A pair of vertices: what the paper calls a and b.
@@ -125,4 +126,89 @@ fn axis_misses(pyramid: &ClipPyramid, aabb: &Aabb) -> bool {
     const WIDER: f32 = 1.0 + 32.0 * UNIT_ROUNDOFF;
     let (entry, exit) = pyramid.axis.slab(aabb);
     exit < 0.0 || entry > exit * WIDER * WIDER
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{ClipCounts, ClipPyramid, Verdict, classify};
+    use hybray_geometry::{Aabb, Pyramid, Vec3};
+
+    /// The pyramid from the origin along z whose section at z = 1 has these corners, left bottom first, clockwise.
+    fn pyramid(corners: [[f32; 2]; 4]) -> ClipPyramid {
+        let corners = corners.map(|[x, y]| Vec3::new(x, y, 1.0));
+        ClipPyramid::new(&Pyramid::through(Vec3::ZERO, corners).unwrap()).unwrap()
+    }
+
+    /// A square on its point: the planes are at 45 degrees to the cells.
+    fn diamond() -> ClipPyramid {
+        pyramid([[-0.5, 0.0], [0.0, 0.5], [0.5, 0.0], [0.0, -0.5]])
+    }
+
+    fn check(pyramid: &ClipPyramid, lo: [f32; 3], hi: [f32; 3], expected: Verdict) -> ClipCounts {
+        let mut counts = ClipCounts::default();
+        let aabb = Aabb { lo: Vec3::from_array(lo), hi: Vec3::from_array(hi) };
+        assert_eq!(classify(pyramid, &aabb, &mut counts), expected, "{aabb:?}");
+        assert_eq!(counts.second, 1, "the first test was meant to leave it open");
+        counts
+    }
+
+    /// Bars at z = 1 beyond one point of the diamond, from one corner subspace to the one opposite: which of the two
+    /// evaluations tells is different for bars on opposite sides.
+    #[test]
+    fn ends_in_opposite_corners_take_both_evaluations() {
+        let d = diamond();
+        check(&d, [-2.0, 0.6, 1.0], [2.0, 0.7, 1.01], Verdict::Outside);
+        check(&d, [-2.0, -0.7, 1.0], [2.0, -0.6, 1.01], Verdict::Outside);
+        check(&d, [0.6, -2.0, 1.0], [0.7, 2.0, 1.01], Verdict::Outside);
+        check(&d, [-0.7, -2.0, 1.0], [-0.6, 2.0, 1.01], Verdict::Outside);
+        check(&d, [-2.0, 0.4, 1.0], [2.0, 0.7, 1.01], Verdict::Partly);
+        check(&d, [-2.0, -0.7, 1.0], [2.0, -0.4, 1.01], Verdict::Partly);
+        check(&d, [0.4, -2.0, 1.0], [0.7, 2.0, 1.01], Verdict::Partly);
+        check(&d, [-0.7, -2.0, 1.0], [-0.4, 2.0, 1.01], Verdict::Partly);
+    }
+
+    /// Ends in neighbouring sides (D and B): one evaluation.
+    #[test]
+    fn ends_in_neighbouring_sides_take_one() {
+        let turned = pyramid([[-0.5, -0.3], [-0.3, 0.5], [0.5, 0.3], [0.3, -0.5]]);
+        let counts = check(&turned, [-1.0, 0.55, 1.0], [0.2, 0.65, 1.01], Verdict::Outside);
+        // Four edges along x, and no other with ends in two subspaces.
+        assert_eq!(counts.evaluations, 4);
+        check(&turned, [-1.0, 0.4, 1.0], [0.2, 0.65, 1.01], Verdict::Partly);
+    }
+
+    /// No edge meets the pyramid, and the vertices are neither in A, C, F and H all, nor on facing sides.
+    #[test]
+    fn a_cell_can_surround_the_pyramid() {
+        let turned = pyramid([[-0.02, -0.01], [-0.01, 0.02], [0.02, 0.01], [0.01, -0.02]]);
+        let counts = check(&turned, [-0.1, -0.04, 1.1], [0.036, 0.064, 1.6], Verdict::Partly);
+        assert_eq!((counts.surrounded, counts.edges), (1, 12));
+    }
+
+    /// The same where the cell reaches behind the apex, so that its projection tells nothing: the edges are seen in A, C,
+    /// F and H whether the rays pass through the cell or away from it.
+    #[test]
+    fn the_axis_decides_for_a_cell_beside_the_apex() {
+        let oblique = pyramid([[0.6, -0.5], [0.55, 0.1], [1.3, 0.3], [1.2, -0.6]]);
+        let counts = check(&oblique, [0.1, -0.8, -0.3], [0.2, 0.1, 0.4], Verdict::Partly);
+        assert_eq!((counts.surrounded, counts.edges), (1, 12));
+        let counts = check(&oblique, [-1.0, -0.1, -0.4], [-0.2, 0.2, 0.8], Verdict::Outside);
+        assert_eq!((counts.surrounded, counts.edges), (0, 12));
+    }
+
+    /// Four planes alone leave these open, or take them for cells that surround the pyramid.
+    #[test]
+    fn behind_the_apex() {
+        let mut counts = ClipCounts::default();
+        let narrow = pyramid([[-0.1, -0.1], [-0.1, 0.1], [0.1, 0.1], [0.1, -0.1]]);
+        let mut of = |lo: [f32; 3], hi: [f32; 3]| {
+            classify(&narrow, &Aabb { lo: Vec3::from_array(lo), hi: Vec3::from_array(hi) }, &mut counts)
+        };
+        assert_eq!(of([-10.0, -10.0, -2.0], [10.0, 10.0, -1.0]), Verdict::Outside, "a wall behind");
+        assert_eq!(of([-10.0, -10.0, -2.0], [10.0, 10.0, 1.0]), Verdict::Partly, "the apex inside");
+        assert_eq!(of([-10.0, -10.0, 0.0], [10.0, 10.0, 1.0]), Verdict::Partly, "the apex in a face");
+        assert_eq!(of([0.0, 0.0, -1.0], [1.0, 1.0, 0.0]), Verdict::Partly, "the apex at a vertex");
+        assert_eq!(of([-10.0, -10.0, 1e-3], [10.0, 10.0, 1.0]), Verdict::Partly, "a wall ahead");
+        assert_eq!(of([-10.0, -10.0, -1.0], [10.0, -0.2, 1.0]), Verdict::Outside, "beside and below");
+    }
 }

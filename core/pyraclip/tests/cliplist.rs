@@ -10,7 +10,7 @@ fn no_touched_leaf_is_missing_and_the_order_is_front_to_back() {
     for (name, tree) in trees() {
         let leaves: Vec<u32> = tree.leaves().collect();
         let (mut touched, mut listed) = (0, 0);
-        for_each_pyramid(4, 6, |camera, pyramid, rays| {
+        for_each_pyramid(4, 4, |camera, pyramid, rays| {
             let list = tree.list(pyramid, &mut ClipCounts::default());
             listed += list.len();
             let mut place = vec![usize::MAX; tree.nodes.len()];

@@ -78,11 +78,7 @@ impl Child {
                     1 => Kind::Sphere,
                     _ => Kind::Cone,
                 };
-                Self::Leaf {
-                    kind,
-                    start: packed & ((1 << START_BITS) - 1),
-                    count: (packed >> START_BITS & 15) + 1,
-                }
+                Self::Leaf { kind, start: packed & ((1 << START_BITS) - 1), count: (packed >> START_BITS & 15) + 1 }
             }
             2 => Self::Page(packed & (TAG_LEAF - 1)),
             _ => Self::Unused,
@@ -92,11 +88,7 @@ impl Child {
 
 impl Node {
     /// A node without children.
-    pub const EMPTY: Self = Self {
-        lo: [[f32::MAX; WIDTH]; 3],
-        hi: [[f32::MIN; WIDTH]; 3],
-        child: [TAG_UNUSED; WIDTH],
-    };
+    pub const EMPTY: Self = Self { lo: [[f32::MAX; WIDTH]; 3], hi: [[f32::MIN; WIDTH]; 3], child: [TAG_UNUSED; WIDTH] };
 
     /// Puts a child into `slot`.
     pub fn set(&mut self, slot: usize, aabb: &Aabb, child: Child) {

@@ -143,8 +143,14 @@ impl<'a> PageView<'a> {
         if header.magic != Header::MAGIC {
             return Err(PageError::Magic(header.magic));
         }
-        let counts =
-            [header.nodes, header.triangle_blocks, header.sphere_blocks, header.cones, header.normals, header.materials];
+        let counts = [
+            header.nodes,
+            header.triangle_blocks,
+            header.sphere_blocks,
+            header.cones,
+            header.normals,
+            header.materials,
+        ];
         if counts.iter().any(|&n| n as usize > PAGE_BYTES_MAX) {
             return Err(PageError::Header("more of something than a page can hold"));
         }

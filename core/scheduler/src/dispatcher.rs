@@ -146,10 +146,15 @@ impl<'m> Dispatcher<'m> {
         self.dearest = self.dearest.max(cost);
     }
 
+    /// How many nodes share the picture: also those that have not been heard of yet, or the first would be given all.
+    fn sharing(&self) -> u32 {
+        (self.nodes.iter().skip(1).filter(|n| !n.lost).count() as u32).max(1)
+    }
+
     /// T as it is now.
     #[must_use]
     pub fn spread(&self) -> f32 {
-        let nodes = self.nodes.iter().filter(|n| n.here).count() as u32;
+        let nodes = self.sharing();
         self.options.spread.unwrap_or(if self.runs_done < 2 * nodes || self.cheapest == 0 {
             SPREAD_START
         } else {
@@ -166,7 +171,7 @@ impl<'m> Dispatcher<'m> {
         }
         let (tiles, nanoseconds) =
             self.nodes.iter().fold((0, 0), |(t, n), node| (t + node.tiles_done, n + node.nanoseconds));
-        let nodes = self.nodes.iter().filter(|n| n.here).count().max(1) as u32;
+        let nodes = self.sharing();
         let most = (self.tiles / (16 * nodes)).max(1);
         if tiles == 0 || self.overhead == u64::MAX {
             return most.min(4);
@@ -223,7 +228,7 @@ impl<'m> Dispatcher<'m> {
         }
         let shares = Shares {
             tiles: self.tiles - self.next,
-            nodes: self.nodes.iter().filter(|n| n.here).count() as u32,
+            nodes: self.sharing(),
             spread: self.spread(),
             relative_rate: self.relative_rate(peer),
             atomic: self.atomic(),

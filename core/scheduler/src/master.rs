@@ -12,6 +12,8 @@ pub struct Progress {
     pub finished: u32,
     /// Tiles of the picture.
     pub tiles: u32,
+    /// Rays that have ended.
+    pub rays: u64,
 }
 
 /// How it ended.
@@ -68,17 +70,12 @@ pub struct Master<'m> {
     looking: Option<u32>,
     asked_again: bool,
     refused_frames: u64,
+    rays: u64,
 }
 
 impl<'m> Master<'m> {
     /// Begins `frame` on `film`; tiles are given out by `dispatcher`.
-    pub fn new(
-        frame: Frame,
-        film: Film<'m>,
-        nodes: &'m mut [NodeReport],
-        scene_hash: u64,
-        dispatcher: Peer,
-    ) -> Self {
+    pub fn new(frame: Frame, film: Film<'m>, nodes: &'m mut [NodeReport], scene_hash: u64, dispatcher: Peer) -> Self {
         nodes.fill(NodeReport::default());
         Self {
             frame,
@@ -92,6 +89,7 @@ impl<'m> Master<'m> {
             looking: None,
             asked_again: false,
             refused_frames: 0,
+            rays: 0,
         }
     }
 
@@ -116,7 +114,7 @@ impl<'m> Master<'m> {
     /// How far it is.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        Progress { finished: self.film.finished(), tiles: self.film.map().len() }
+        Progress { finished: self.film.finished(), tiles: self.film.map().len(), rays: self.rays }
     }
 
     /// How it ended, once everybody has been told.
@@ -152,7 +150,8 @@ impl<'m> Master<'m> {
                     self.end(Outcome::Stranger { peer: from });
                 }
             }
-            Message::Contributions { tile, epoch, width, height, entry } => {
+            Message::Contributions { tile, epoch, width, height, rays, entry } => {
+                self.rays += u64::from(rays);
                 if self.film.add(tile, epoch, (width, height), entry, view.body).is_err() {
                     self.refused_frames += 1;
                 }

@@ -32,7 +32,7 @@ pub struct NodeMemory {
     hits: [Hit; BUNDLE],
     places: [Place; BUNDLE],
     sums: [[u64; 3]; BUNDLE],
-    entries: [u64; TILES],
+    entries: [Entry; TILES],
     lane: [HitRecord; DEPTH_MAX],
     stack: Stack,
     bundle: wide::Scratch,
@@ -51,7 +51,7 @@ impl NodeMemory {
             hits: [Hit::none(0.0); BUNDLE],
             places: [Place::default(); BUNDLE],
             sums: [[0; 3]; BUNDLE],
-            entries: [0; TILES],
+            entries: [Entry::default(); TILES],
             lane: [HitRecord::EMPTY; DEPTH_MAX],
             stack: Stack::new(),
             bundle: wide::Scratch::new(),
@@ -63,6 +63,13 @@ impl Default for NodeMemory {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Ledger entries of a tile.
+#[derive(Clone, Copy, Default)]
+struct Entry {
+    sum: u64,
+    rays: u32,
 }
 
 /// Where a ray of the bundle belongs.
@@ -175,9 +182,10 @@ impl<'m, 's> Node<'m, 's> {
         match *message {
             Message::Begin(frame) => self.begin(frame),
             Message::Tiles { first, count, epoch } => {
-                let fits = self.picture.as_ref().is_some_and(|p| {
-                    count > 0 && first.checked_add(count).is_some_and(|end| end <= p.map.len())
-                });
+                let fits = self
+                    .picture
+                    .as_ref()
+                    .is_some_and(|p| count > 0 && first.checked_add(count).is_some_and(|end| end <= p.map.len()));
                 // A dispatcher never has more than two runs at a node; one that does is not heard.
                 if fits && self.runs.push_back(Run { first, count, epoch, done: 0, nanoseconds: 0 }).is_ok() {
                     self.runs_given += 1;
@@ -269,7 +277,7 @@ impl<'m, 's> Node<'m, 's> {
             }
         }
         m.sums[..tiles * TILE_PIXELS].fill([0; 3]);
-        m.entries[..tiles].fill(0);
+        m.entries[..tiles].fill(Entry::default());
         self.bundle = (first, tiles, rays);
         self.start_sample(0);
         true
@@ -308,7 +316,8 @@ impl<'m, 's> Node<'m, 's> {
         let epoch = self.runs.front().map_or(0, |run| run.epoch);
         let (samples, width) = (picture.frame.samples, picture.frame.width);
         let m = &mut *self.memory;
-        let mut sums = Sums { step: picture.step, sums: &mut m.sums, entries: &mut m.entries, at: 0, counts: Counts::default() };
+        let mut sums =
+            Sums { step: picture.step, sums: &mut m.sums, entries: &mut m.entries, at: 0, counts: Counts::default() };
         let mut walker = Walker { kernels: self.kernels, stack: &mut m.stack, counts: Default::default() };
         let mut lane = Lane::new(&mut m.lane);
         let mut counts = Counts::default();
@@ -410,7 +419,8 @@ impl<'m, 's> Node<'m, 's> {
                 epoch: run.epoch,
                 width: shape.width as u8,
                 height: shape.height as u8,
-                entry: m.entries[tile],
+                rays: m.entries[tile].rays,
+                entry: m.entries[tile].sum,
             };
             let sums = &m.sums[tile * TILE_PIXELS..][..shape.pixels()];
             let sent = link.send(HOST, MESSAGE_BYTES_MAX, &mut |room| {
@@ -427,9 +437,13 @@ impl<'m, 's> Node<'m, 's> {
             tile += 1;
         }
         self.stage = if tile < tiles { Stage::Sending { tile } } else { Stage::Idle };
-        if tile == tiles && let Some(run) = self.runs.front_mut() {
+        if tile == tiles
+            && let Some(run) = self.runs.front_mut()
+        {
             run.done += tiles as u32;
-            if run.done == run.count && let Some(run) = self.runs.pop_front() {
+            if run.done == run.count
+                && let Some(run) = self.runs.pop_front()
+            {
                 // There is room: no more runs are taken in than this queue holds, and each is told before the next ends.
                 let _ = self.done.push_back(run);
             }
@@ -447,7 +461,7 @@ const fn even_bits(code: u32) -> u32 {
 struct Sums<'a> {
     step: Step,
     sums: &'a mut [[u64; 3]; BUNDLE],
-    entries: &'a mut [u64; TILES],
+    entries: &'a mut [Entry; TILES],
     /// The pixel that is being traced.
     at: usize,
     counts: Counts,
@@ -471,6 +485,7 @@ impl Sink for Sums<'_> {
 
     fn ended(&mut self, _: &Origin, entry: u64) {
         let tile = &mut self.entries[self.at / TILE_PIXELS];
-        *tile = tile.wrapping_add(entry);
+        tile.sum = tile.sum.wrapping_add(entry);
+        tile.rays += 1;
     }
 }

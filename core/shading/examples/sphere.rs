@@ -5,9 +5,7 @@
 use std::io::Write;
 
 use glam::Vec3;
-use hybray_shading::{
-    Camera, Child, Filter, Light, LightKind, Material, Scene, Surface, id, sample_offset, spawn,
-};
+use hybray_shading::{Camera, Child, Filter, Light, LightKind, Material, Scene, Surface, id, sample_offset, spawn};
 
 const SIZE: u32 = 256;
 const SPP: u32 = 16;
@@ -18,19 +16,13 @@ fn hit(origin: Vec3, direction: Vec3, t_max: f32, medium: u16) -> Option<(f32, S
     let along = -origin.dot(direction) / a;
     let nearest = origin + direction * along;
     let half_chord = ((1.0 - nearest.dot(nearest)) / a).sqrt();
-    let ball = [along - half_chord, along + half_chord]
-        .into_iter()
-        .find(|&t| t > 0.0 && t < t_max);
-    let floor =
-        Some((-1.0 - origin.z) / direction.z).filter(|&t| t > 0.0 && t < ball.unwrap_or(t_max));
+    let ball = [along - half_chord, along + half_chord].into_iter().find(|&t| t > 0.0 && t < t_max);
+    let floor = Some((-1.0 - origin.z) / direction.z).filter(|&t| t > 0.0 && t < ball.unwrap_or(t_max));
     let t = floor.or(ball)?;
     let position = origin + direction * t;
     let (position, normal) = match floor {
         Some(_) => (position.with_z(-1.0), Vec3::Z),
-        None => (
-            position / position.dot(position).sqrt(),
-            position / position.dot(position).sqrt(),
-        ),
+        None => (position / position.dot(position).sqrt(), position / position.dot(position).sqrt()),
     };
     let surface = Surface {
         position,
@@ -46,13 +38,7 @@ fn hit(origin: Vec3, direction: Vec3, t_max: f32, medium: u16) -> Option<(f32, S
 }
 
 /// What is left of a shadow ray's contribution at the light.
-fn lit(
-    scene: &Scene,
-    mut origin: Vec3,
-    direction: Vec3,
-    mut t_max: f32,
-    mut left: [f32; 3],
-) -> Option<[f32; 3]> {
+fn lit(scene: &Scene, mut origin: Vec3, direction: Vec3, mut t_max: f32, mut left: [f32; 3]) -> Option<[f32; 3]> {
     while let Some((t, surface)) = hit(origin, direction, t_max, 0) {
         (origin, left) = spawn::pass_through(scene, &surface, left)?;
         t_max -= t;
@@ -61,10 +47,7 @@ fn lit(
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let floor = Material {
-        ambient: [0.75; 3],
-        ..Material::MATT
-    };
+    let floor = Material { ambient: [0.75; 3], ..Material::MATT };
     let glass = Material {
         diffuse: [0.0; 3],
         transmission: [0.8, 0.95, 0.9],
@@ -91,29 +74,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         distance_scale: 1.0,
         shadow_rays: spawn::shadow_rays(&lights),
     };
-    let camera = Camera::look(
-        Vec3::new(0.0, -5.0, 1.5),
-        Vec3::ZERO,
-        Vec3::Z,
-        35.0,
-        0.0,
-        SIZE,
-        SIZE,
-    )?;
+    let camera = Camera::look(Vec3::new(0.0, -5.0, 1.5), Vec3::ZERO, Vec3::Z, 35.0, 0.0, SIZE, SIZE)?;
     let mut picture = Vec::new();
     for pixel in 0..SIZE * SIZE {
         let mut sum = Vec3::ZERO;
         for sample in 0..SPP {
             let offset = sample_offset(Filter::Gaussian, id::pixel_id(0, pixel), sample, SPP);
             let ray = camera.ray(pixel % SIZE, pixel / SIZE, offset);
-            let mut waiting = vec![(
-                ray.origin,
-                ray.direction,
-                [1.0; 3],
-                1,
-                0,
-                id::primary_id(0, pixel, sample),
-            )];
+            let mut waiting = vec![(ray.origin, ray.direction, [1.0; 3], 1, 0, id::primary_id(0, pixel, sample))];
             while let Some((origin, direction, weight, depth, medium, id)) = waiting.pop() {
                 let Some((_, surface)) = hit(origin, direction, f32::INFINITY, medium) else {
                     sum += Vec3::from(weight) * Vec3::new(0.5, 0.7, 1.0);
@@ -122,47 +90,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 sum += Vec3::from(spawn::local(&scene, &surface, weight));
                 for cursor in 0..spawn::children(&scene, &surface) {
                     match spawn::child(&scene, &surface, weight, depth, id, cursor) {
-                        Child::Shadow {
-                            origin,
-                            direction,
-                            t_max,
-                            contribution,
-                            ..
-                        } => {
+                        Child::Shadow { origin, direction, t_max, contribution, .. } => {
                             let left = lit(&scene, origin, direction, t_max, contribution);
                             sum += left.map_or(Vec3::ZERO, Vec3::from);
                         }
-                        Child::Mirror {
-                            origin,
-                            direction,
-                            weight,
-                            medium,
-                            branch,
-                        }
-                        | Child::Refract {
-                            origin,
-                            direction,
-                            weight,
-                            medium,
-                            branch,
-                        } => {
-                            waiting.push((
-                                origin,
-                                direction,
-                                weight,
-                                depth + 1,
-                                medium,
-                                id::child_id(id, branch),
-                            ));
+                        Child::Mirror { origin, direction, weight, medium, branch }
+                        | Child::Refract { origin, direction, weight, medium, branch } => {
+                            waiting.push((origin, direction, weight, depth + 1, medium, id::child_id(id, branch)));
                         }
                         Child::None => {}
                     }
                 }
             }
         }
-        let shown = (sum / SPP as f32)
-            .to_array()
-            .map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8);
+        let shown = (sum / SPP as f32).to_array().map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8);
         picture.extend(shown);
     }
     let mut out = std::io::stdout().lock();

@@ -60,9 +60,7 @@ impl core::fmt::Display for CameraError {
             Self::NotFinite => "a camera coordinate is not a finite number",
             Self::NoView => "the camera's eye and target are the same point",
             Self::UpAlongView => "the camera's up vector is zero or parallel to its view",
-            Self::FieldOfView => {
-                "the camera's field of view must be more than 0 and less than 180 degrees"
-            }
+            Self::FieldOfView => "the camera's field of view must be more than 0 and less than 180 degrees",
             Self::Hither => "the camera's hither distance must be 0 or more",
             Self::Size => "the picture must have at least one pixel and at most 2^32",
         })
@@ -166,11 +164,7 @@ impl Camera {
     /// Unit vectors: right, up, forward.
     #[must_use]
     pub fn axes(&self) -> (Vec3, Vec3, Vec3) {
-        (
-            Vec3::from(self.right),
-            Vec3::from(self.up),
-            Vec3::from(self.forward),
-        )
+        (Vec3::from(self.right), Vec3::from(self.up), Vec3::from(self.forward))
     }
 
     /// Where all rays start.
@@ -203,16 +197,7 @@ mod tests {
     use std::string::ToString;
 
     fn camera() -> Camera {
-        Camera::look(
-            Vec3::new(1.0, 2.0, 3.0),
-            Vec3::new(1.0, 2.0, -7.0),
-            Vec3::Y,
-            90.0,
-            0.5,
-            4,
-            2,
-        )
-        .unwrap()
+        Camera::look(Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, -7.0), Vec3::Y, 90.0, 0.5, 4, 2).unwrap()
     }
 
     #[test]
@@ -233,21 +218,10 @@ mod tests {
 
     #[test]
     fn rays_are_unit_and_start_on_the_hither_plane() {
-        let camera = Camera::look(
-            Vec3::new(3.0, -1.0, 2.0),
-            Vec3::new(-5.0, 4.0, 1.0),
-            Vec3::Z,
-            37.0,
-            1.25,
-            64,
-            48,
-        )
-        .unwrap();
+        let camera =
+            Camera::look(Vec3::new(3.0, -1.0, 2.0), Vec3::new(-5.0, 4.0, 1.0), Vec3::Z, 37.0, 1.25, 64, 48).unwrap();
         let (right, up, forward) = camera.axes();
-        assert!(
-            (right.cross(up) + forward).abs().max_element() < 1e-6,
-            "right x up points at the viewer"
-        );
+        assert!((right.cross(up) + forward).abs().max_element() < 1e-6, "right x up points at the viewer");
         assert!(up.z > 0.9);
         let half = libm::tan(37.0 / 360.0 * core::f64::consts::PI);
         for y in 0..48 {
@@ -262,14 +236,8 @@ mod tests {
                 // Slopes from the definition: the picture's edges are `half` away in y, and pixels are square.
                 let expected_x = (f64::from(x) + 0.75 - 32.0) / 24.0 * half;
                 let expected_y = (24.0 - f64::from(y)) / 24.0 * half;
-                assert!(
-                    (dot(d, wide(right)) / cosine - expected_x).abs() < 1e-6,
-                    "{x} {y}"
-                );
-                assert!(
-                    (dot(d, wide(up)) / cosine - expected_y).abs() < 1e-6,
-                    "{x} {y}"
-                );
+                assert!((dot(d, wide(right)) / cosine - expected_x).abs() < 1e-6, "{x} {y}");
+                assert!((dot(d, wide(up)) / cosine - expected_y).abs() < 1e-6, "{x} {y}");
             }
         }
     }
@@ -281,15 +249,8 @@ mod tests {
             let middle = camera.ray(x, y, [0.0; 2]);
             for offset in [[0.5, 0.0], [0.0, 0.5], [-0.5, 0.0], [0.0, -0.5]] {
                 let d = camera.ray(x, y, offset).direction;
-                let tangent = d
-                    .cross(middle.direction)
-                    .dot(d.cross(middle.direction))
-                    .sqrt()
-                    / d.dot(middle.direction);
-                assert!(
-                    tangent < middle.spread * 1.01 && tangent > middle.spread * 0.6,
-                    "{tangent} {middle:?}"
-                );
+                let tangent = d.cross(middle.direction).dot(d.cross(middle.direction)).sqrt() / d.dot(middle.direction);
+                assert!(tangent < middle.spread * 1.01 && tangent > middle.spread * 0.6, "{tangent} {middle:?}");
             }
         }
     }
@@ -303,27 +264,17 @@ mod tests {
             let high = camera.slope(x0 + 7, y0, [1.5, -1.5]);
             for i in 0..2000u32 {
                 let [u, v] = crate::id::unit_pair(5, i);
-                let slope =
-                    camera.slope(x0 + i % 8, y0 + i / 8 % 8, [3.0 * u - 1.5, 3.0 * v - 1.5]);
-                assert!(
-                    (0..2).all(|a| low[a] <= slope[a] && slope[a] <= high[a]),
-                    "{low:?} {slope:?} {high:?}"
-                );
+                let slope = camera.slope(x0 + i % 8, y0 + i / 8 % 8, [3.0 * u - 1.5, 3.0 * v - 1.5]);
+                assert!((0..2).all(|a| low[a] <= slope[a] && slope[a] <= high[a]), "{low:?} {slope:?} {high:?}");
             }
         }
     }
 
-    fn check_error(
-        change: impl Fn(&mut (Vec3, Vec3, Vec3, f32, f32, u32, u32)),
-        expected: CameraError,
-    ) {
+    fn check_error(change: impl Fn(&mut (Vec3, Vec3, Vec3, f32, f32, u32, u32)), expected: CameraError) {
         let mut a = (Vec3::ZERO, Vec3::X, Vec3::Z, 45.0, 0.0, 16, 16);
         assert!(Camera::look(a.0, a.1, a.2, a.3, a.4, a.5, a.6).is_ok());
         change(&mut a);
-        assert_eq!(
-            Camera::look(a.0, a.1, a.2, a.3, a.4, a.5, a.6),
-            Err(expected)
-        );
+        assert_eq!(Camera::look(a.0, a.1, a.2, a.3, a.4, a.5, a.6), Err(expected));
         assert!(!expected.to_string().is_empty());
     }
 
@@ -331,10 +282,7 @@ mod tests {
     fn bad_cameras_are_refused() {
         check_error(|a| a.1 = a.0, CameraError::NoView);
         check_error(|a| a.2 = Vec3::X * -3.0, CameraError::UpAlongView);
-        check_error(
-            |a| a.2 = Vec3::new(1.0, 1e-8, 0.0),
-            CameraError::UpAlongView,
-        );
+        check_error(|a| a.2 = Vec3::new(1.0, 1e-8, 0.0), CameraError::UpAlongView);
         check_error(|a| a.2 = Vec3::ZERO, CameraError::UpAlongView);
         check_error(|a| a.3 = 0.0, CameraError::FieldOfView);
         check_error(|a| a.3 = -10.0, CameraError::FieldOfView);

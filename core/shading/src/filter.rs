@@ -23,9 +23,7 @@ impl Filter {
     /// The filter called `box`, `tent` or `gaussian`.
     #[must_use]
     pub fn parse(name: &str) -> Option<Self> {
-        [Self::Box, Self::Tent, Self::Gaussian]
-            .into_iter()
-            .find(|filter| filter.name() == name)
+        [Self::Box, Self::Tent, Self::Gaussian].into_iter().find(|filter| filter.name() == name)
     }
 
     /// What [`Filter::parse`] reads.
@@ -79,19 +77,11 @@ impl Filter {
 /// the centre; more are stratified, for every `spp`.
 #[must_use]
 pub fn sample_offset(filter: Filter, pixel_id: u64, sample: u32, spp: u32) -> [f32; 2] {
-    if spp <= 1 {
-        [0.0; 2]
-    } else {
-        filter.offset(stratified(pixel_id, sample, spp))
-    }
+    if spp <= 1 { [0.0; 2] } else { filter.offset(stratified(pixel_id, sample, spp)) }
 }
 
 fn tent(u: f32) -> f32 {
-    if u < 0.5 {
-        libm::sqrtf(2.0 * u) - 1.0
-    } else {
-        1.0 - libm::sqrtf(2.0 * (1.0 - u))
-    }
+    if u < 0.5 { libm::sqrtf(2.0 * u) - 1.0 } else { 1.0 - libm::sqrtf(2.0 * (1.0 - u)) }
 }
 
 /// Share of a normal distribution within three deviations.
@@ -141,21 +131,12 @@ mod tests {
                 let [x, y] = filter.offset([u, 1.0 - u]);
                 assert!(x.abs() <= filter.radius() && y.abs() <= filter.radius());
                 let back = cumulative(filter, f64::from(x));
-                assert!(
-                    (back - f64::from(u)).abs() < 3e-7,
-                    "{filter:?}: {u} gives {x}, which gives {back}"
-                );
+                assert!((back - f64::from(u)).abs() < 3e-7, "{filter:?}: {u} gives {x}, which gives {back}");
             }
             let end = 1.0 - 1.0 / 16_777_216.0;
             let [low, high] = filter.offset([0.0, end]);
-            assert!(
-                low >= -filter.radius() && low < -0.999 * filter.radius(),
-                "{filter:?} {low}"
-            );
-            assert!(
-                high <= filter.radius() && high > 0.999 * filter.radius(),
-                "{filter:?} {high}"
-            );
+            assert!(low >= -filter.radius() && low < -0.999 * filter.radius(), "{filter:?} {low}");
+            assert!(high <= filter.radius() && high > 0.999 * filter.radius(), "{filter:?} {high}");
         }
     }
 
@@ -164,13 +145,11 @@ mod tests {
         let pixels = 40_000 / spp;
         for pixel in 0..pixels {
             for sample in 0..spp {
-                let offset = sample_offset(filter, crate::id::pixel_id(1, pixel), sample, spp)
-                    .map(f64::from);
+                let offset = sample_offset(filter, crate::id::pixel_id(1, pixel), sample, spp).map(f64::from);
                 for axis in 0..2 {
                     sum[axis] += offset[axis];
                     square[axis] += offset[axis] * offset[axis];
-                    bins[axis]
-                        [(cumulative(filter, offset[axis]) * 16.0).clamp(0.0, 15.0) as usize] += 1;
+                    bins[axis][(cumulative(filter, offset[axis]) * 16.0).clamp(0.0, 15.0) as usize] += 1;
                 }
                 cross += offset[0] * offset[1];
             }
@@ -178,29 +157,14 @@ mod tests {
         let n = f64::from(pixels * spp);
         for axis in 0..2 {
             // Stratification only narrows these: bounds of four deviations of independent samples.
-            assert!(
-                (sum[axis] / n).abs() < 4.0 * (variance / n).sqrt(),
-                "{filter:?} {spp}: mean {}",
-                sum[axis] / n
-            );
-            assert!(
-                (square[axis] / n / variance - 1.0).abs() < 0.04,
-                "{filter:?} {spp}: {}",
-                square[axis] / n
-            );
+            assert!((sum[axis] / n).abs() < 4.0 * (variance / n).sqrt(), "{filter:?} {spp}: mean {}", sum[axis] / n);
+            assert!((square[axis] / n / variance - 1.0).abs() < 0.04, "{filter:?} {spp}: {}", square[axis] / n);
             for count in bins[axis] {
                 let expected = n / 16.0;
-                assert!(
-                    (f64::from(count) - expected).abs() < 5.0 * expected.sqrt(),
-                    "{filter:?} {spp}: {bins:?}"
-                );
+                assert!((f64::from(count) - expected).abs() < 5.0 * expected.sqrt(), "{filter:?} {spp}: {bins:?}");
             }
         }
-        assert!(
-            (cross / n).abs() < 5.0 * variance / n.sqrt(),
-            "{filter:?} {spp}: covariance {}",
-            cross / n
-        );
+        assert!((cross / n).abs() < 5.0 * variance / n.sqrt(), "{filter:?} {spp}: covariance {}", cross / n);
     }
 
     #[test]

@@ -61,19 +61,13 @@ mod tests {
 
     #[test]
     fn power_against_f64() {
-        for exponent in [
-            0.0, 0.5, 1.0, 2.0, 3.0, 7.0, 8.0, 10.0, 12.5, 60.0, 100.0, 250.0, 1000.0, 65_536.0,
-            1e6,
-        ] {
+        for exponent in [0.0, 0.5, 1.0, 2.0, 3.0, 7.0, 8.0, 10.0, 12.5, 60.0, 100.0, 250.0, 1000.0, 65_536.0, 1e6] {
             for i in 0..=1000 {
                 let base = i as f32 / 1000.0;
                 let expected = libm::pow(f64::from(base), f64::from(exponent));
                 let found = f64::from(power(base, exponent));
                 let slack = 1.5e-7 * (2.0 + f64::from(exponent).min(65_536.0)) * expected + 1e-37;
-                assert!(
-                    (found - expected).abs() <= slack,
-                    "{base}^{exponent}: {found} {expected}"
-                );
+                assert!((found - expected).abs() <= slack, "{base}^{exponent}: {found} {expected}");
             }
         }
         assert_eq!(power(0.5, -3.0), 1.0);
@@ -88,43 +82,22 @@ mod tests {
             let angle = degrees.to_radians();
             Vec3::new(libm::sin(angle) as f32, 0.0, libm::cos(angle) as f32)
         };
-        let material = Material {
-            highlight: highlight as u32,
-            exponent,
-            ..Material::MATT
-        };
+        let material = Material { highlight: highlight as u32, exponent, ..Material::MATT };
         let found = strength(&material, -at(view), Vec3::Z, at(light));
         let angle = match highlight {
             Highlight::None => 90.0,
             Highlight::Phong => light + view,
             Highlight::Blinn => (light + view) / 2.0,
         };
-        let expected = libm::pow(
-            libm::cos(f64::to_radians(angle)).max(0.0),
-            f64::from(exponent),
-        );
-        let expected = if highlight == Highlight::None {
-            0.0
-        } else {
-            expected
-        };
-        assert!(
-            (f64::from(found) - expected).abs() < 1e-6 * f64::from(1.0 + exponent),
-            "{found} {expected}"
-        );
+        let expected = libm::pow(libm::cos(f64::to_radians(angle)).max(0.0), f64::from(exponent));
+        let expected = if highlight == Highlight::None { 0.0 } else { expected };
+        assert!((f64::from(found) - expected).abs() < 1e-6 * f64::from(1.0 + exponent), "{found} {expected}");
     }
 
     #[test]
     fn highlights_against_f64() {
         for exponent in [1.0, 2.0, 4.5, 20.0, 99.0] {
-            for (view, light) in [
-                (0.0, 0.0),
-                (30.0, -30.0),
-                (30.0, -20.0),
-                (60.0, 10.0),
-                (80.0, 70.0),
-                (-15.0, 40.0),
-            ] {
+            for (view, light) in [(0.0, 0.0), (30.0, -30.0), (30.0, -20.0), (60.0, 10.0), (80.0, 70.0), (-15.0, 40.0)] {
                 check(Highlight::Phong, exponent, view, light);
                 check(Highlight::Blinn, exponent, view, light);
                 check(Highlight::None, exponent, view, light);

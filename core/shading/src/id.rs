@@ -103,8 +103,7 @@ mod tests {
         assert!(count > 3_000_000);
         for shift in [0, 24, 56] {
             let mut bins = [0u32; 256];
-            ids.iter()
-                .for_each(|id| bins[(id >> shift) as usize & 255] += 1);
+            ids.iter().for_each(|id| bins[(id >> shift) as usize & 255] += 1);
             chi_square(&bins, count);
         }
         let zero_sum = ids.iter().fold(0u64, |sum, id| sum.wrapping_add(*id));
@@ -117,20 +116,13 @@ mod tests {
     /// 255 degrees of freedom: mean 255, deviation 22.6; the bounds are five deviations away.
     fn chi_square(bins: &[u32; 256], count: usize) {
         let expected = count as f64 / 256.0;
-        let chi: f64 = bins
-            .iter()
-            .map(|&n| (f64::from(n) - expected) * (f64::from(n) - expected) / expected)
-            .sum();
+        let chi: f64 = bins.iter().map(|&n| (f64::from(n) - expected) * (f64::from(n) - expected) / expected).sum();
         assert!((142.0..368.0).contains(&chi), "chi-square {chi}");
     }
 
     #[test]
     fn pairs_are_uniform_and_independent() {
-        for ids in [
-            |i: u32| primary_id(0, i, 0),
-            |i: u32| child_id(77, i),
-            |i: u32| u64::from(i),
-        ] {
+        for ids in [|i: u32| primary_id(0, i, 0), |i: u32| child_id(77, i), |i: u32| u64::from(i)] {
             for dimension in [0, 1, 9] {
                 let mut bins = [0u32; 256];
                 for i in 0..200_000 {
@@ -145,8 +137,7 @@ mod tests {
         let mut bins = [0u32; 256];
         for i in 0..200_000 {
             let id = primary_id(3, i, 0);
-            bins[(unit_pair(id, 0)[0] * 16.0) as usize * 16
-                + (unit_pair(id, 1)[0] * 16.0) as usize] += 1;
+            bins[(unit_pair(id, 0)[0] * 16.0) as usize * 16 + (unit_pair(id, 1)[0] * 16.0) as usize] += 1;
         }
         chi_square(&bins, 200_000);
     }
@@ -164,17 +155,11 @@ mod tests {
             let mut changes = [0u32; 64];
             for i in 0..inputs {
                 let difference = f(i) ^ f(i ^ (1 << flipped));
-                changes
-                    .iter_mut()
-                    .enumerate()
-                    .for_each(|(bit, n)| *n += (difference >> bit) as u32 & 1);
+                changes.iter_mut().enumerate().for_each(|(bit, n)| *n += (difference >> bit) as u32 & 1);
             }
             for (bit, &n) in changes.iter().enumerate() {
                 let share = f64::from(n) / inputs as f64;
-                assert!(
-                    (0.4..0.6).contains(&share),
-                    "input bit {flipped}, output bit {bit}: {share}"
-                );
+                assert!((0.4..0.6).contains(&share), "input bit {flipped}, output bit {bit}: {share}");
             }
         }
     }
@@ -194,11 +179,7 @@ mod tests {
     #[test]
     fn mixer_is_splitmix64() {
         let mut state = 1_234_567u64;
-        for expected in [
-            6_457_827_717_110_365_317,
-            3_203_168_211_198_807_973,
-            9_817_491_932_198_370_423,
-        ] {
+        for expected in [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423] {
             state = state.wrapping_add(BRANCH_STEP);
             assert_eq!(mix(state), expected);
         }

@@ -33,30 +33,17 @@ const JUST_SHORT: f32 = 1.0 - 8.0 / 16_777_216.0;
 /// `distance_scale` is the length of an internal unit in file units. Averaged over `u`, the strength times a surface's
 /// cosine is the irradiance over pi, without bias.
 #[inline(always)]
-pub(crate) fn arrival(
-    light: &Light,
-    point: Vec3,
-    distance_scale: f32,
-    u: [f32; 2],
-) -> Option<Arrival> {
+pub(crate) fn arrival(light: &Light, point: Vec3, distance_scale: f32, u: [f32; 2]) -> Option<Arrival> {
     match light.kind() {
         LightKind::Point => to_end(light, point, Vec3::from(light.position), distance_scale),
         LightKind::Directional => {
             let direction = -Vec3::from(light.axis);
-            Some(Arrival {
-                path: direction,
-                direction,
-                t_max: f32::INFINITY,
-                strength: 1.0,
-            })
+            Some(Arrival { path: direction, direction, t_max: f32::INFINITY, strength: 1.0 })
         }
         LightKind::Spot => {
             let found = to_end(light, point, Vec3::from(light.position), distance_scale)?;
             let share = spot(light, -found.direction.dot(Vec3::from(light.axis)));
-            (share > 0.0).then_some(Arrival {
-                strength: found.strength * share,
-                ..found
-            })
+            (share > 0.0).then_some(Arrival { strength: found.strength * share, ..found })
         }
         LightKind::Rectangle => rectangle(light, point, distance_scale, u),
         LightKind::Sphere => sphere(light, point, distance_scale, u),
@@ -109,11 +96,7 @@ fn off_light(end: Vec3, size: Vec3, normal: Vec3) -> Vec3 {
 
 /// Uniform over the area.
 fn rectangle(light: &Light, point: Vec3, distance_scale: f32, u: [f32; 2]) -> Option<Arrival> {
-    let (corner, side_u, side_v) = (
-        Vec3::from(light.position),
-        Vec3::from(light.u),
-        Vec3::from(light.v),
-    );
+    let (corner, side_u, side_v) = (Vec3::from(light.position), Vec3::from(light.u), Vec3::from(light.v));
     let normal = side_u.cross(side_v);
     if normal == Vec3::ZERO {
         return None;
@@ -123,10 +106,7 @@ fn rectangle(light: &Light, point: Vec3, distance_scale: f32, u: [f32; 2]) -> Op
     let end = off_light(end, corner.abs() + side_u.abs() + side_v.abs(), normal);
     let found = to_end(light, point, end, distance_scale)?;
     let cosine = -found.direction.dot(normal);
-    (cosine > 0.0).then_some(Arrival {
-        strength: found.strength * cosine,
-        ..found
-    })
+    (cosine > 0.0).then_some(Arrival { strength: found.strength * cosine, ..found })
 }
 
 /// Uniform over the solid angle in which the sphere is seen. Source: Pharr, Jakob, Humphreys, *Physically Based
@@ -154,19 +134,12 @@ fn sphere(light: &Light, point: Vec3, distance_scale: f32, u: [f32; 2]) -> Optio
     let inside = radius_square - square * off_square;
     let near = distance * (1.0 - versine) - libm::sqrtf(if inside > 0.0 { inside } else { 0.0 });
     let outward = direction * near - to_centre;
-    let normal = if outward.dot(outward) > 0.0 {
-        normalize(outward)
-    } else {
-        -axis
-    };
+    let normal = if outward.dot(outward) > 0.0 { normalize(outward) } else { -axis };
     let end = centre + normal * light.radius;
     let end = off_light(end, centre.abs() + Vec3::splat(light.radius), normal);
     let found = to_end(light, point, end, distance_scale)?;
     // Radiance times solid angle over pi. `falloff` is asked for the centre's distance: it is the centre's light.
-    Some(Arrival {
-        strength: falloff(light, distance, distance_scale) * (2.0 / (1.0 + cosine)),
-        ..found
-    })
+    Some(Arrival { strength: falloff(light, distance, distance_scale) * (2.0 / (1.0 + cosine)), ..found })
 }
 
 #[cfg(test)]
@@ -176,21 +149,12 @@ mod tests {
     use crate::stratify::stratified;
 
     fn light(kind: LightKind) -> Light {
-        Light {
-            kind: kind as u32,
-            colour: [1.0; 3],
-            axis: [0.0, 0.0, -1.0],
-            flags: Light::FALLOFF,
-            ..Light::default()
-        }
+        Light { kind: kind as u32, colour: [1.0; 3], axis: [0.0, 0.0, -1.0], flags: Light::FALLOFF, ..Light::default() }
     }
 
     #[test]
     fn point_lights_fall_off_with_the_file_distance() {
-        let lamp = Light {
-            position: [0.0, 0.0, 4.0],
-            ..light(LightKind::Point)
-        };
+        let lamp = Light { position: [0.0, 0.0, 4.0], ..light(LightKind::Point) };
         for (scale, expected) in [(1.0, 1.0 / 16.0), (0.25, 1.0), (2.0, 1.0 / 64.0)] {
             let found = arrival(&lamp, Vec3::ZERO, scale, [0.0; 2]).unwrap();
             assert_eq!(found.strength, expected);
@@ -198,50 +162,23 @@ mod tests {
             assert!(found.t_max < 1.0 && found.t_max > 1.0 - 1e-6);
         }
         let steady = Light { flags: 0, ..lamp };
-        assert_eq!(
-            arrival(&steady, Vec3::ZERO, 1.0, [0.0; 2])
-                .unwrap()
-                .strength,
-            1.0
-        );
+        assert_eq!(arrival(&steady, Vec3::ZERO, 1.0, [0.0; 2]).unwrap().strength, 1.0);
         assert_eq!(arrival(&lamp, Vec3::Z * 4.0, 1.0, [0.0; 2]), None);
     }
 
     #[test]
     fn directional_lights_come_from_infinity() {
-        let found = arrival(
-            &light(LightKind::Directional),
-            Vec3::splat(1e6),
-            1.0,
-            [0.0; 2],
-        )
-        .unwrap();
-        assert_eq!(
-            found,
-            Arrival {
-                path: Vec3::Z,
-                direction: Vec3::Z,
-                t_max: f32::INFINITY,
-                strength: 1.0
-            }
-        );
+        let found = arrival(&light(LightKind::Directional), Vec3::splat(1e6), 1.0, [0.0; 2]).unwrap();
+        assert_eq!(found, Arrival { path: Vec3::Z, direction: Vec3::Z, t_max: f32::INFINITY, strength: 1.0 });
     }
 
     fn check_spot(degrees: f64, expected: f64) {
         let cosine = |degrees: f64| libm::cos(degrees.to_radians()) as f32;
-        let lamp = Light {
-            cos_inner: cosine(20.0),
-            cos_outer: cosine(30.0),
-            flags: 0,
-            ..light(LightKind::Spot)
-        };
+        let lamp = Light { cos_inner: cosine(20.0), cos_outer: cosine(30.0), flags: 0, ..light(LightKind::Spot) };
         let angle = degrees.to_radians();
         let point = Vec3::new(libm::sin(angle) as f32, 0.0, -libm::cos(angle) as f32) * 5.0;
         let found = arrival(&lamp, point, 1.0, [0.0; 2]).map_or(0.0, |a| f64::from(a.strength));
-        assert!(
-            (found - expected).abs() < 1e-5,
-            "{degrees}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < 1e-5, "{degrees}: {found} {expected}");
     }
 
     #[test]
@@ -252,19 +189,9 @@ mod tests {
         check_spot(179.0, 0.0);
         let (inner, outer) = (f64::cos(20f64.to_radians()), f64::cos(30f64.to_radians()));
         check_spot(libm::acos((inner + outer) / 2.0).to_degrees(), 0.5);
-        check_spot(
-            libm::acos(0.25 * inner + 0.75 * outer).to_degrees(),
-            0.15625,
-        );
-        let hard = Light {
-            cos_inner: 0.5,
-            cos_outer: 0.5,
-            ..light(LightKind::Spot)
-        };
-        assert_eq!(
-            (spot(&hard, 0.501), spot(&hard, 0.5), spot(&hard, 0.499)),
-            (1.0, 1.0, 0.0)
-        );
+        check_spot(libm::acos(0.25 * inner + 0.75 * outer).to_degrees(), 0.15625);
+        let hard = Light { cos_inner: 0.5, cos_outer: 0.5, ..light(LightKind::Spot) };
+        assert_eq!((spot(&hard, 0.501), spot(&hard, 0.5), spot(&hard, 0.499)), (1.0, 1.0, 0.0));
     }
 
     /// Irradiance over pi at `point` facing `normal`, by `samples` rays.
@@ -289,40 +216,20 @@ mod tests {
         let mut sum = 0.0;
         for i in 0..4 {
             let (a, b) = (rays[i], rays[(i + 1) % 4]);
-            let c = [
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ];
+            let c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
             sum += libm::acos(dot(a, b)) * dot(c, wide(normal)) / dot(c, c).sqrt();
         }
         sum.abs() / (2.0 * core::f64::consts::PI)
     }
 
     fn check_rectangle(point: Vec3, normal: Vec3) {
-        let (corner, u, v) = (
-            Vec3::new(-1.0, -0.5, 2.0),
-            Vec3::new(0.2, 1.5, 0.1),
-            Vec3::new(2.0, -0.3, 0.0),
-        );
-        let lamp = Light {
-            position: corner.into(),
-            u: u.into(),
-            v: v.into(),
-            ..light(LightKind::Rectangle)
-        };
+        let (corner, u, v) = (Vec3::new(-1.0, -0.5, 2.0), Vec3::new(0.2, 1.5, 0.1), Vec3::new(2.0, -0.3, 0.0));
+        let lamp = Light { position: corner.into(), u: u.into(), v: v.into(), ..light(LightKind::Rectangle) };
         let area = f64::from(u.cross(v).length());
-        let exact = lambert(
-            [corner, corner + u, corner + u + v, corner + v],
-            point,
-            normal,
-        ) * core::f64::consts::PI
-            / area;
+        let exact =
+            lambert([corner, corner + u, corner + u + v, corner + v], point, normal) * core::f64::consts::PI / area;
         let found = irradiance(&lamp, point, normal, 65_536);
-        assert!(
-            (found / exact - 1.0).abs() < 2e-3,
-            "{point}: {found} {exact}"
-        );
+        assert!((found / exact - 1.0).abs() < 2e-3, "{point}: {found} {exact}");
         // Few samples, averaged over many points' ids, agree as well: no bias.
         let mut sum = 0.0;
         for key in 0..20_000 {
@@ -337,53 +244,30 @@ mod tests {
     #[test]
     fn rectangles_against_lamberts_formula() {
         check_rectangle(Vec3::ZERO, Vec3::Z);
-        check_rectangle(
-            Vec3::new(1.5, -2.0, 0.5),
-            normalize(Vec3::new(-0.3, 0.4, 1.0)),
-        );
+        check_rectangle(Vec3::new(1.5, -2.0, 0.5), normalize(Vec3::new(-0.3, 0.4, 1.0)));
         check_rectangle(Vec3::new(0.0, 0.3, 1.5), Vec3::Z);
-        check_rectangle(
-            Vec3::new(-6.0, 0.0, -3.0),
-            normalize(Vec3::new(1.0, 0.0, 0.5)),
-        );
+        check_rectangle(Vec3::new(-6.0, 0.0, -3.0), normalize(Vec3::new(1.0, 0.0, 0.5)));
     }
 
     #[test]
     fn rectangles_have_a_dark_side() {
-        let lamp = Light {
-            u: [0.0, 1.0, 0.0],
-            v: [1.0, 0.0, 0.0],
-            ..light(LightKind::Rectangle)
-        };
+        let lamp = Light { u: [0.0, 1.0, 0.0], v: [1.0, 0.0, 0.0], ..light(LightKind::Rectangle) };
         assert!(arrival(&lamp, Vec3::new(0.3, 0.3, -1.0), 1.0, [0.5; 2]).is_some());
-        assert_eq!(
-            arrival(&lamp, Vec3::new(0.3, 0.3, 1.0), 1.0, [0.5; 2]),
-            None
-        );
-        let flat = Light {
-            v: [0.0, 3.0, 0.0],
-            ..lamp
-        };
+        assert_eq!(arrival(&lamp, Vec3::new(0.3, 0.3, 1.0), 1.0, [0.5; 2]), None);
+        let flat = Light { v: [0.0, 3.0, 0.0], ..lamp };
         assert_eq!(arrival(&flat, Vec3::NEG_Z, 1.0, [0.5; 2]), None);
     }
 
     fn check_sphere(radius: f32, point: Vec3, normal: Vec3, samples: u32, slack: f64) {
         let centre = Vec3::new(0.5, -0.25, 3.0);
-        let lamp = Light {
-            position: centre.into(),
-            radius,
-            ..light(LightKind::Sphere)
-        };
+        let lamp = Light { position: centre.into(), radius, ..light(LightKind::Sphere) };
         // A sphere that is wholly above the horizon gives what a point at its centre gives, at every distance.
         let to_centre = centre - point;
         let square = f64::from(to_centre.dot(to_centre));
         assert!(to_centre.dot(normal) > radius);
         let exact = f64::from(to_centre.dot(normal)) / square.sqrt() / square;
         let found = irradiance(&lamp, point, normal, samples);
-        assert!(
-            (found / exact - 1.0).abs() < slack,
-            "{radius} {point}: {found} {exact}"
-        );
+        assert!((found / exact - 1.0).abs() < slack, "{radius} {point}: {found} {exact}");
     }
 
     #[test]
@@ -392,13 +276,7 @@ mod tests {
         for radius in [1e-6, 1e-3, 0.1, 1.0, 1.9] {
             check_sphere(radius, Vec3::ZERO, Vec3::Z, 65_536, 1e-3);
             check_sphere(radius, Vec3::ZERO, slanted, 65_536, 1e-3);
-            check_sphere(
-                radius,
-                Vec3::new(300.0, 20.0, -200.0),
-                normalize(Vec3::new(-1.0, 0.0, 0.5)),
-                4096,
-                1e-3,
-            );
+            check_sphere(radius, Vec3::new(300.0, 20.0, -200.0), normalize(Vec3::new(-1.0, 0.0, 0.5)), 4096, 1e-3);
         }
         check_sphere(2.99, Vec3::new(0.5, -0.25, 0.0), Vec3::Z, 65_536, 2e-3);
     }
@@ -408,20 +286,11 @@ mod tests {
     #[test]
     fn half_sunk_spheres_against_their_exact_irradiance() {
         for radius in [0.3f64, 1.0, 2.5] {
-            let lamp = Light {
-                position: [3.0, 0.0, 0.0],
-                radius: radius as f32,
-                ..light(LightKind::Sphere)
-            };
+            let lamp = Light { position: [3.0, 0.0, 0.0], radius: radius as f32, ..light(LightKind::Sphere) };
             let s = radius / 3.0;
-            let exact = (libm::asin(s) - s * (1.0 - s * s).sqrt())
-                / core::f64::consts::PI
-                / (radius * radius);
+            let exact = (libm::asin(s) - s * (1.0 - s * s).sqrt()) / core::f64::consts::PI / (radius * radius);
             let found = irradiance(&lamp, Vec3::ZERO, Vec3::Z, 65_536);
-            assert!(
-                (found / exact - 1.0).abs() < 2e-3,
-                "{radius}: {found} {exact}"
-            );
+            assert!((found / exact - 1.0).abs() < 2e-3, "{radius}: {found} {exact}");
         }
     }
 
@@ -429,15 +298,7 @@ mod tests {
     fn far_away_all_kinds_agree() {
         let point = Vec3::new(0.0, 0.0, -1000.0);
         for flags in [0, Light::FALLOFF] {
-            let expected = irradiance(
-                &Light {
-                    flags,
-                    ..light(LightKind::Point)
-                },
-                point,
-                Vec3::Z,
-                1,
-            );
+            let expected = irradiance(&Light { flags, ..light(LightKind::Point) }, point, Vec3::Z, 1);
             for kind in [LightKind::Spot, LightKind::Sphere, LightKind::Rectangle] {
                 let lamp = Light {
                     u: [0.0, 1.0, 0.0],
@@ -449,10 +310,7 @@ mod tests {
                     ..light(kind)
                 };
                 let found = irradiance(&lamp, point, Vec3::Z, 64);
-                assert!(
-                    (found / expected - 1.0).abs() < 1e-5,
-                    "{kind:?} {flags}: {found} {expected}"
-                );
+                assert!((found / expected - 1.0).abs() < 1e-5, "{kind:?} {flags}: {found} {expected}");
             }
         }
     }
@@ -463,11 +321,7 @@ mod tests {
             let u = crate::id::unit_pair(4, i);
             let [x, y] = crate::id::unit_pair(5, i);
             let centre = Vec3::new(x * 100.0, 40.0, y - 0.5);
-            let lamp = Light {
-                position: centre.into(),
-                radius: 0.25,
-                ..light(LightKind::Sphere)
-            };
+            let lamp = Light { position: centre.into(), radius: 0.25, ..light(LightKind::Sphere) };
             let point = Vec3::new(y * 100.0, -20.0, x);
             let found = arrival(&lamp, point, 1.0, u).unwrap();
             let wide = |v: Vec3| v.to_array().map(f64::from);
@@ -481,10 +335,7 @@ mod tests {
 
     #[test]
     fn points_inside_a_sphere_get_nothing() {
-        let lamp = Light {
-            radius: 2.0,
-            ..light(LightKind::Sphere)
-        };
+        let lamp = Light { radius: 2.0, ..light(LightKind::Sphere) };
         assert_eq!(arrival(&lamp, Vec3::X, 1.0, [0.5; 2]), None);
         assert_eq!(arrival(&lamp, Vec3::ZERO, 1.0, [0.5; 2]), None);
         assert_eq!(arrival(&lamp, Vec3::X * 2.0, 1.0, [0.5; 2]), None);

@@ -25,22 +25,14 @@ pub fn boundary(eta: f32, cos_in: f32) -> Boundary {
     let a = eta * cos_in;
     let square = a * a + (1.0 - eta) * (1.0 + eta);
     if !(square > 0.0 && cos_in > 0.0) {
-        return Boundary {
-            cos_out: 0.0,
-            reflectance: 1.0,
-            total: true,
-        };
+        return Boundary { cos_out: 0.0, reflectance: 1.0, total: true };
     }
     let cos_out = libm::sqrtf(square);
     let perpendicular = (a - cos_out) / (a + cos_out);
     let b = eta * cos_out;
     let parallel = (cos_in - b) / (cos_in + b);
     let reflectance = 0.5 * (perpendicular * perpendicular + parallel * parallel);
-    Boundary {
-        cos_out,
-        reflectance,
-        total: false,
-    }
+    Boundary { cos_out, reflectance, total: false }
 }
 
 /// The direction `incoming` mirrored at a surface of unit normal `normal` (either side); of unit length but for
@@ -76,17 +68,11 @@ mod tests {
             return;
         }
         let out = refract(incoming, Vec3::Z, eta, cos_in, found.cos_out);
-        assert!(
-            (f64::from(out.x) - exact_sine).abs() < 2e-7,
-            "{eta} {degrees}: {out} {exact_sine}"
-        );
+        assert!((f64::from(out.x) - exact_sine).abs() < 2e-7, "{eta} {degrees}: {out} {exact_sine}");
         let exact_cosine = (1.0 - exact_sine * exact_sine).max(0.0).sqrt();
         // Near the critical angle the cosine is the root of a small difference of f32 numbers.
         let slack = 3e-7 * (1.5 + f64::from(eta) / exact_cosine.max(1e-4));
-        assert!(
-            (f64::from(-out.z) - exact_cosine).abs() < slack,
-            "{eta} {degrees}: {out} {exact_cosine}"
-        );
+        assert!((f64::from(-out.z) - exact_cosine).abs() < slack, "{eta} {degrees}: {out} {exact_cosine}");
         // Fresnel by the sine and tangent formulas, which share nothing with those above.
         let other = exact_sine.asin();
         let (sum, difference) = (angle + other, angle - other);
@@ -103,17 +89,7 @@ mod tests {
 
     #[test]
     fn snell_and_fresnel_against_f64() {
-        for eta in [
-            1.0 / 1.5,
-            1.5,
-            1.33,
-            1.0 / 1.33,
-            2.42,
-            1.0 / 2.42,
-            1.000_1,
-            0.999_9,
-            1.0,
-        ] {
+        for eta in [1.0 / 1.5, 1.5, 1.33, 1.0 / 1.33, 2.42, 1.0 / 2.42, 1.000_1, 0.999_9, 1.0] {
             for tenth in 0..900 {
                 check_snell(eta, f64::from(tenth) / 10.0);
             }
@@ -122,9 +98,7 @@ mod tests {
 
     #[test]
     fn fresnel_at_known_angles() {
-        let at = |eta: f64, degrees: f64| {
-            boundary(eta as f32, libm::cos(degrees.to_radians()) as f32).reflectance
-        };
+        let at = |eta: f64, degrees: f64| boundary(eta as f32, libm::cos(degrees.to_radians()) as f32).reflectance;
         assert!((at(1.0 / 1.5, 0.0) - 0.04).abs() < 1e-7);
         assert!((at(1.5, 0.0) - 0.04).abs() < 1e-7);
         assert!((at(1.0 / 1.33, 0.0) - 0.020_059_31).abs() < 1e-7);
@@ -142,10 +116,7 @@ mod tests {
             let cos_in = libm::cos((f64::from(tenth) / 10.0).to_radians()) as f32;
             let there = boundary(1.0 / 1.5, cos_in);
             let back = boundary(1.5, there.cos_out);
-            assert!(
-                (there.reflectance - back.reflectance).abs() < 1e-6 / cos_in,
-                "{tenth}: {there:?} {back:?}"
-            );
+            assert!((there.reflectance - back.reflectance).abs() < 1e-6 / cos_in, "{tenth}: {there:?} {back:?}");
             assert!((back.cos_out - cos_in).abs() < 1e-6 / cos_in);
         }
     }
@@ -154,8 +125,7 @@ mod tests {
     fn total_reflection_begins_at_the_critical_angle() {
         for ior in [1.1f64, 1.33, 1.5, 2.42] {
             let critical = libm::asin(1.0 / ior).to_degrees();
-            let total =
-                |degrees: f64| boundary(ior as f32, libm::cos(degrees.to_radians()) as f32).total;
+            let total = |degrees: f64| boundary(ior as f32, libm::cos(degrees.to_radians()) as f32).total;
             assert!(!total(critical - 1e-3) && total(critical + 1e-3), "{ior}");
         }
     }
@@ -164,22 +134,13 @@ mod tests {
     fn equal_indices_bend_nothing() {
         let incoming = normalize(Vec3::new(0.3, -0.2, -0.7));
         let found = boundary(1.0, -incoming.z);
-        assert_eq!(
-            refract(incoming, Vec3::Z, 1.0, -incoming.z, found.cos_out),
-            incoming
-        );
+        assert_eq!(refract(incoming, Vec3::Z, 1.0, -incoming.z, found.cos_out), incoming);
     }
 
     #[test]
     fn mirror_keeps_the_plane_and_turns_the_rest() {
-        assert_eq!(
-            mirror(Vec3::new(0.6, 0.0, -0.8), Vec3::Z),
-            Vec3::new(0.6, 0.0, 0.8)
-        );
-        assert_eq!(
-            mirror(Vec3::new(0.6, 0.0, -0.8), Vec3::NEG_Z),
-            Vec3::new(0.6, 0.0, 0.8)
-        );
+        assert_eq!(mirror(Vec3::new(0.6, 0.0, -0.8), Vec3::Z), Vec3::new(0.6, 0.0, 0.8));
+        assert_eq!(mirror(Vec3::new(0.6, 0.0, -0.8), Vec3::NEG_Z), Vec3::new(0.6, 0.0, 0.8));
     }
 
     #[test]

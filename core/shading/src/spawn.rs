@@ -100,9 +100,7 @@ pub enum Child {
 /// Shadow rays that one hit may send to `lights`.
 #[must_use]
 pub fn shadow_rays(lights: &[Light]) -> u32 {
-    lights
-        .iter()
-        .fold(0, |sum: u32, light| sum.saturating_add(light.shadow_rays()))
+    lights.iter().fold(0, |sum: u32, light| sum.saturating_add(light.shadow_rays()))
 }
 
 /// What the surface shows without any light: emission and ambient light, times `weight`.
@@ -131,14 +129,7 @@ pub fn children(scene: &Scene<'_>, surface: &Surface) -> u32 {
 ///
 /// Bounded work: constant if every light casts one shadow ray, else at most one look at each light.
 #[must_use]
-pub fn child(
-    scene: &Scene<'_>,
-    surface: &Surface,
-    weight: [f32; 3],
-    depth: u32,
-    id: u64,
-    cursor: u32,
-) -> Child {
+pub fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
     let material = material(scene, surface);
     let facing = Facing::new(surface);
     if let Some(past_lights) = cursor.checked_sub(scene.shadow_rays) {
@@ -147,9 +138,7 @@ pub fn child(
             0 if deeper && (material.mirrors() || material.transmits()) => {
                 mirrored(scene, material, surface, &facing, weight, cursor)
             }
-            1 if deeper && material.transmits() => {
-                refracted(scene, material, surface, &facing, weight, cursor)
-            }
+            1 if deeper && material.transmits() => refracted(scene, material, surface, &facing, weight, cursor),
             _ => Child::None,
         };
     }
@@ -160,19 +149,13 @@ pub fn child(
     let Some((light, first)) = find_light(scene, cursor) else {
         return Child::None;
     };
-    shadow(
-        scene, material, surface, &facing, light, first, weight, id, cursor,
-    )
+    shadow(scene, material, surface, &facing, light, first, weight, id, cursor)
 }
 
 /// What goes on of a shadow ray that meets this surface: where it starts again, and what is left of its contribution.
 /// `None` if the surface is opaque. The direction stays; the new `t_max` is the old one minus the hit's `t`.
 #[must_use]
-pub fn pass_through(
-    scene: &Scene<'_>,
-    surface: &Surface,
-    contribution: [f32; 3],
-) -> Option<(Vec3, [f32; 3])> {
+pub fn pass_through(scene: &Scene<'_>, surface: &Surface, contribution: [f32; 3]) -> Option<(Vec3, [f32; 3])> {
     let material = material(scene, surface);
     let left = channels(|c| contribution[c] * material.transmission[c]);
     let ahead = if surface.geometric_normal.dot(surface.incoming) < 0.0 {
@@ -199,28 +182,12 @@ struct Facing {
 impl Facing {
     fn new(surface: &Surface) -> Self {
         let normal = surface.geometric_normal;
-        let geometric = if normal.dot(surface.incoming) > 0.0 {
-            -normal
-        } else {
-            normal
-        };
+        let geometric = if normal.dot(surface.incoming) > 0.0 { -normal } else { normal };
         let shading = surface.shading_normal;
         // By the geometric normal and not by the view: a shading normal may lean away from the viewer.
-        let shading = if shading.dot(geometric) < 0.0 {
-            -shading
-        } else {
-            shading
-        };
+        let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
         let lifts = surface.shadow_offset.dot(geometric) > 0.0;
-        Self {
-            geometric,
-            shading,
-            shadow_offset: if lifts {
-                surface.shadow_offset
-            } else {
-                Vec3::ZERO
-            },
-        }
+        Self { geometric, shading, shadow_offset: if lifts { surface.shadow_offset } else { Vec3::ZERO } }
     }
 
     /// The shading normal, bent just enough to face the viewer, and its cosine with the view.
@@ -234,18 +201,11 @@ impl Facing {
 /// `direction`, bent towards `normal` if it makes less than the grazing angle with the surface.
 fn lift(direction: Vec3, normal: Vec3) -> Vec3 {
     let cosine = direction.dot(normal);
-    if cosine >= GRAZING {
-        direction
-    } else {
-        normalize(direction + normal * (GRAZING - cosine))
-    }
+    if cosine >= GRAZING { direction } else { normalize(direction + normal * (GRAZING - cosine)) }
 }
 
 fn material<'a>(scene: &Scene<'a>, surface: &Surface) -> &'a Material {
-    scene
-        .materials
-        .get(usize::from(surface.material))
-        .unwrap_or(&Material::MATT)
+    scene.materials.get(usize::from(surface.material)).unwrap_or(&Material::MATT)
 }
 
 fn channels(f: impl Fn(usize) -> f32) -> [f32; 3] {
@@ -255,10 +215,7 @@ fn channels(f: impl Fn(usize) -> f32) -> [f32; 3] {
 /// The light whose shadow rays `cursor` is among, and the first of its cursor positions.
 fn find_light<'a>(scene: &Scene<'a>, cursor: u32) -> Option<(&'a Light, u32)> {
     if scene.shadow_rays as usize == scene.lights.len() {
-        return scene
-            .lights
-            .get(cursor as usize)
-            .map(|light| (light, cursor));
+        return scene.lights.get(cursor as usize).map(|light| (light, cursor));
     }
     let mut first = 0u32;
     for light in scene.lights {
@@ -285,18 +242,12 @@ fn shadow(
     let rays = light.shadow_rays();
     let sample = match light.kind() {
         LightKind::Point | LightKind::Directional | LightKind::Spot => [0.5; 2],
-        LightKind::Sphere | LightKind::Rectangle => {
-            stratified(id::random(id, first), cursor - first, rays)
-        }
+        LightKind::Sphere | LightKind::Rectangle => stratified(id::random(id, first), cursor - first, rays),
     };
     // The lifted point is rounded once more. Shadow rays start on the viewer's side, wherever the light is.
     let lifted = surface.position + facing.shadow_offset;
     let error = surface.error + (lifted.abs() + facing.shadow_offset.abs()) * f32::EPSILON;
-    let error = if facing.shadow_offset == Vec3::ZERO {
-        surface.error
-    } else {
-        error
-    };
+    let error = if facing.shadow_offset == Vec3::ZERO { surface.error } else { error };
     let origin = offset_origin(lifted, error, facing.geometric, facing.geometric);
     let Some(found) = arrival(light, origin, scene.distance_scale, sample) else {
         return Child::None;
@@ -308,25 +259,16 @@ fn shadow(
     if !(cosine > 0.0) || (behind && facing.shadow_offset == Vec3::ZERO) {
         return Child::None;
     }
-    let highlight =
-        highlight::strength(material, surface.incoming, facing.shading, found.direction);
+    let highlight = highlight::strength(material, surface.incoming, facing.shading, found.direction);
     let strength = found.strength / rays as f32;
     let contribution = channels(|c| {
-        weight[c]
-            * (light.colour[c] * strength)
-            * (material.diffuse[c] * cosine + material.specular[c] * highlight)
+        weight[c] * (light.colour[c] * strength) * (material.diffuse[c] * cosine + material.specular[c] * highlight)
     });
     // What is not finite goes on: the film counts it.
     if contribution == [0.0; 3] {
         return Child::None;
     }
-    Child::Shadow {
-        origin,
-        direction: found.path,
-        t_max: found.t_max,
-        contribution,
-        branch: cursor.saturating_add(1),
-    }
+    Child::Shadow { origin, direction: found.path, t_max: found.t_max, contribution, branch: cursor.saturating_add(1) }
 }
 
 /// What happens at the boundary of a transmitting material.
@@ -344,43 +286,22 @@ impl Crossing {
         let inside = surface.material.saturating_add(1);
         let here = match surface.medium.checked_sub(1) {
             None => 1.0,
-            Some(around) => scene
-                .materials
-                .get(usize::from(around))
-                .map_or(1.0, index_of_refraction),
+            Some(around) => scene.materials.get(usize::from(around)).map_or(1.0, index_of_refraction),
         };
-        let (there, medium) = if surface.medium == inside {
-            (1.0, 0)
-        } else {
-            (index_of_refraction(material), inside)
-        };
+        let (there, medium) = if surface.medium == inside { (1.0, 0) } else { (index_of_refraction(material), inside) };
         let eta = here / there;
         let (normal, cos_in) = facing.towards_viewer(surface.incoming);
-        Self {
-            normal,
-            cos_in,
-            eta,
-            boundary: optics::boundary(eta, cos_in),
-            medium,
-        }
+        Self { normal, cos_in, eta, boundary: optics::boundary(eta, cos_in), medium }
     }
 
     /// Share of the transmitted light that is mirrored instead.
     fn mirrored(&self, material: &Material) -> f32 {
-        if self.boundary.total || material.flags & Material::FRESNEL != 0 {
-            self.boundary.reflectance
-        } else {
-            0.0
-        }
+        if self.boundary.total || material.flags & Material::FRESNEL != 0 { self.boundary.reflectance } else { 0.0 }
     }
 }
 
 fn index_of_refraction(material: &Material) -> f32 {
-    if material.ior > 0.0 && material.ior.is_finite() {
-        material.ior
-    } else {
-        1.0
-    }
+    if material.ior > 0.0 && material.ior.is_finite() { material.ior } else { 1.0 }
 }
 
 /// Whether a ray of this weight is worth tracing.
@@ -396,27 +317,16 @@ fn mirrored(
     weight: [f32; 3],
     cursor: u32,
 ) -> Child {
-    let share = if material.transmits() {
-        Crossing::new(scene, material, surface, facing).mirrored(material)
-    } else {
-        0.0
-    };
+    let share =
+        if material.transmits() { Crossing::new(scene, material, surface, facing).mirrored(material) } else { 0.0 };
     let weight = channels(|c| weight[c] * (material.mirror[c] + material.transmission[c] * share));
     if !carries(scene, weight) {
         return Child::None;
     }
     let (normal, _) = facing.towards_viewer(surface.incoming);
-    let direction = lift(
-        normalize(optics::mirror(surface.incoming, normal)),
-        facing.geometric,
-    );
+    let direction = lift(normalize(optics::mirror(surface.incoming, normal)), facing.geometric);
     Child::Mirror {
-        origin: offset_origin(
-            surface.position,
-            surface.error,
-            facing.geometric,
-            facing.geometric,
-        ),
+        origin: offset_origin(surface.position, surface.error, facing.geometric, facing.geometric),
         direction,
         weight,
         medium: surface.medium,
@@ -438,20 +348,8 @@ fn refracted(
     if crossing.boundary.total || !carries(scene, weight) {
         return Child::None;
     }
-    let Crossing {
-        normal,
-        cos_in,
-        eta,
-        boundary,
-        medium,
-    } = crossing;
-    let direction = normalize(optics::refract(
-        surface.incoming,
-        normal,
-        eta,
-        cos_in,
-        boundary.cos_out,
-    ));
+    let Crossing { normal, cos_in, eta, boundary, medium } = crossing;
+    let direction = normalize(optics::refract(surface.incoming, normal, eta, cos_in, boundary.cos_out));
     let beyond = -facing.geometric;
     Child::Refract {
         origin: offset_origin(surface.position, surface.error, beyond, beyond),

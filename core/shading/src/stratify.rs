@@ -42,37 +42,23 @@ mod tests {
             let points: Vec<[f32; 2]> = (0..count).map(|i| stratified(key, i, count)).collect();
             for (i, p) in points.iter().enumerate() {
                 let column = f64::from(p[0]) * f64::from(count);
-                assert!(
-                    column > i as f64 - 1e-3 && column < i as f64 + 1.0,
-                    "{count}: column {i} has {column}"
-                );
+                assert!(column > i as f64 - 1e-3 && column < i as f64 + 1.0, "{count}: column {i} has {column}");
             }
             for level in 0..=count.ilog2() {
                 let mut rows = vec![0u32; 1 << level];
-                points
-                    .iter()
-                    .for_each(|p| rows[(p[1] * (1 << level) as f32) as usize] += 1);
+                points.iter().for_each(|p| rows[(p[1] * (1 << level) as f32) as usize] += 1);
                 let (least, most) = (count >> level, count.div_ceil(1 << level));
-                assert!(
-                    rows.iter().all(|n| (least..=most).contains(n)),
-                    "{count}: {rows:?}"
-                );
+                assert!(rows.iter().all(|n| (least..=most).contains(n)), "{count}: {rows:?}");
             }
             if count.is_power_of_two() {
                 for level in 0..=count.ilog2() {
                     let columns = count >> level;
                     let mut boxes = vec![0u32; count as usize];
                     for p in &points {
-                        let (x, y) = (
-                            (p[0] * columns as f32) as u32,
-                            (p[1] * (1 << level) as f32) as u32,
-                        );
+                        let (x, y) = ((p[0] * columns as f32) as u32, (p[1] * (1 << level) as f32) as u32);
                         boxes[(y * columns + x) as usize] += 1;
                     }
-                    assert!(
-                        boxes.iter().all(|&n| n == 1),
-                        "{count}, level {level}: {boxes:?}"
-                    );
+                    assert!(boxes.iter().all(|&n| n == 1), "{count}, level {level}: {boxes:?}");
                 }
             }
         }
@@ -81,9 +67,7 @@ mod tests {
     #[test]
     fn every_count_is_stratified() {
         (1..=40).for_each(check);
-        [64, 100, 127, 128, 129, 256, 1000, 1024]
-            .into_iter()
-            .for_each(check);
+        [64, 100, 127, 128, 129, 256, 1000, 1024].into_iter().for_each(check);
     }
 
     #[test]
@@ -96,10 +80,7 @@ mod tests {
                     let within = x * count as f32 - index as f32;
                     bins[((within * 8.0) as usize).min(7) * 8 + (y * 8.0) as usize] += 1;
                 }
-                let chi: f64 = bins
-                    .iter()
-                    .map(|&n| (f64::from(n) - 1000.0).powi(2) / 1000.0)
-                    .sum();
+                let chi: f64 = bins.iter().map(|&n| (f64::from(n) - 1000.0).powi(2) / 1000.0).sum();
                 // 63 degrees of freedom, deviation 11.2.
                 assert!((20.0..125.0).contains(&chi), "{count}, {index}: {chi}");
             }
@@ -111,27 +92,15 @@ mod tests {
     #[test]
     fn scrambling_is_nested() {
         let second = |key, index| (stratified(key, index, 4)[1] * 4.0) as u32 & 1;
-        let alike = (0..10_000)
-            .filter(|&key| second(key, 0) == second(key, 1))
-            .count();
+        let alike = (0..10_000).filter(|&key| second(key, 0) == second(key, 1)).count();
         assert!((4700..5300).contains(&alike), "{alike}");
     }
 
     #[test]
     fn huge_counts_and_stray_indices_stay_inside() {
-        for (index, count) in [
-            (0, 0),
-            (5, 0),
-            (9, 3),
-            (u32::MAX, u32::MAX),
-            (u32::MAX - 1, u32::MAX),
-            (0, u32::MAX),
-        ] {
+        for (index, count) in [(0, 0), (5, 0), (9, 3), (u32::MAX, u32::MAX), (u32::MAX - 1, u32::MAX), (0, u32::MAX)] {
             let p = stratified(1, index, count);
-            assert!(
-                p.iter().all(|u| (0.0..1.0).contains(u)),
-                "{index} of {count}: {p:?}"
-            );
+            assert!(p.iter().all(|u| (0.0..1.0).contains(u)), "{index} of {count}: {p:?}");
         }
     }
 }

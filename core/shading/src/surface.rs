@@ -34,32 +34,17 @@ impl Surface {
     /// nothing leave the surface flat.
     #[must_use]
     pub fn smooth(self, points: [Vec3; 3], normals: [Vec3; 3], barycentrics: [f32; 3]) -> Self {
-        let sum = normals[0] * barycentrics[0]
-            + normals[1] * barycentrics[1]
-            + normals[2] * barycentrics[2];
+        let sum = normals[0] * barycentrics[0] + normals[1] * barycentrics[1] + normals[2] * barycentrics[2];
         let square = sum.dot(sum);
         if !(square > 1e-12 && square.is_finite()) {
             return self;
         }
-        let own_side = if sum.dot(self.geometric_normal) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let own_side = if sum.dot(self.geometric_normal) < 0.0 { -1.0 } else { 1.0 };
         // The shift bulges towards the viewer, who sees a hollow surface from inside.
-        let viewer_side = if self.incoming.dot(self.geometric_normal) > 0.0 {
-            -own_side
-        } else {
-            own_side
-        };
+        let viewer_side = if self.incoming.dot(self.geometric_normal) > 0.0 { -own_side } else { own_side };
         Self {
             shading_normal: normalize(sum) * own_side,
-            shadow_offset: terminator_shift(
-                self.position,
-                points,
-                normals.map(|n| n * viewer_side),
-                barycentrics,
-            ),
+            shadow_offset: terminator_shift(self.position, points, normals.map(|n| n * viewer_side), barycentrics),
             ..self
         }
     }
@@ -76,13 +61,9 @@ impl Surface {
 #[must_use]
 pub fn offset_origin(position: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     // The margin covers the roundings of this sum, of the products below and of the normal's length.
-    let reach = (normal.x.abs() * error.x + normal.y.abs() * error.y + normal.z.abs() * error.z)
-        * (1.0 + 1.0 / 131_072.0);
-    let away = if normal.dot(direction) < 0.0 {
-        -reach
-    } else {
-        reach
-    };
+    let reach =
+        (normal.x.abs() * error.x + normal.y.abs() * error.y + normal.z.abs() * error.z) * (1.0 + 1.0 / 131_072.0);
+    let away = if normal.dot(direction) < 0.0 { -reach } else { reach };
     Vec3::new(
         away_from(position.x, normal.x * away),
         away_from(position.y, normal.y * away),
@@ -112,12 +93,7 @@ fn away_from(start: f32, step: f32) -> f32 {
 /// Source: Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II, chapter 4, 2021; the barycentric sum of the
 /// differences to the vertices is zero there and is left out here, because in `f32` it is not.
 #[must_use]
-pub fn terminator_shift(
-    position: Vec3,
-    points: [Vec3; 3],
-    normals: [Vec3; 3],
-    barycentrics: [f32; 3],
-) -> Vec3 {
+pub fn terminator_shift(position: Vec3, points: [Vec3; 3], normals: [Vec3; 3], barycentrics: [f32; 3]) -> Vec3 {
     let mut shift = Vec3::ZERO;
     for corner in 0..3 {
         let below = (position - points[corner]).dot(normals[corner]);
@@ -183,11 +159,7 @@ mod tests {
         let [u, v] = unit_pair(11, n);
         let z = 2.0 * u - 1.0;
         let r = (1.0 - z * z).max(0.0).sqrt();
-        normalize(Vec3::new(
-            r * (v * core::f32::consts::TAU).cos(),
-            r * (v * core::f32::consts::TAU).sin(),
-            z,
-        ))
+        normalize(Vec3::new(r * (v * core::f32::consts::TAU).cos(), r * (v * core::f32::consts::TAU).sin(), z))
     }
 
     const ULP: f32 = 1.0 / 8_388_608.0;
@@ -211,10 +183,7 @@ mod tests {
                 assert!(square > exact, "not outside: {centre} {radius} {normal}");
                 // Outside, and not coming nearer. A tangent's sign is within the rounding of the normal.
                 if leaving.dot(normal) > 1e-3 {
-                    assert!(
-                        dot(from_centre, wide(leaving)) > 0.0,
-                        "{centre} {radius} {normal} {leaving}"
-                    );
+                    assert!(dot(from_centre, wide(leaving)) > 0.0, "{centre} {radius} {normal} {leaving}");
                 }
             } else {
                 assert!(square < exact, "not inside: {centre} {radius} {normal}");
@@ -230,11 +199,7 @@ mod tests {
             let points = [corner(1), corner(2), corner(3)];
             let [p, q, r] = points.map(wide);
             let (e, f) = (minus(q, p), minus(r, p));
-            let exact = [
-                e[1] * f[2] - e[2] * f[1],
-                e[2] * f[0] - e[0] * f[2],
-                e[0] * f[1] - e[1] * f[0],
-            ];
+            let exact = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
             let length = dot(exact, exact).sqrt();
             if length < 1e-2 {
                 continue;
@@ -244,63 +209,35 @@ mod tests {
             let (b, c) = (u * 0.5, v * 0.5);
             let a = 1.0 - b - c;
             let position = points[0] * a + points[1] * b + points[2] * c;
-            let error =
-                (points[0].abs() * a + points[1].abs() * b + points[2].abs() * c) * (3.0 * ULP);
+            let error = (points[0].abs() * a + points[1].abs() * b + points[2].abs() * c) * (3.0 * ULP);
             let leaving = direction(9 * i + 4);
             let origin = offset_origin(position, error, normal, leaving);
             let height = dot(minus(wide(origin), p), exact) / length;
             let side = if leaving.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-            assert!(
-                height * side > 0.0,
-                "{points:?} {b} {c} {leaving}: {height}"
-            );
+            assert!(height * side > 0.0, "{points:?} {b} {c} {leaving}: {height}");
             // Outside the box as well, but not far.
             let reach = dot(wide(error), exact.map(f64::abs)) / length;
             let moved = dot(minus(wide(origin), wide(position)), exact) / length * side;
             let ulps = dot(wide(position.abs()), exact.map(f64::abs)) / length * f64::from(ULP);
-            assert!(
-                moved >= reach && moved <= reach * 1.01 + 2.0 * ulps + 1e-30,
-                "{moved} {reach}"
-            );
+            assert!(moved >= reach && moved <= reach * 1.01 + 2.0 * ulps + 1e-30, "{moved} {reach}");
         }
     }
 
     #[test]
     fn offset_moves_only_along_the_normal() {
         let position = Vec3::new(1.0, 2.0, 3.0);
-        let up = offset_origin(
-            position,
-            Vec3::splat(1e-6),
-            Vec3::Z,
-            Vec3::new(1.0, 0.0, 0.1),
-        );
+        let up = offset_origin(position, Vec3::splat(1e-6), Vec3::Z, Vec3::new(1.0, 0.0, 0.1));
         assert_eq!((up.x, up.y), (1.0, 2.0));
         assert!(up.z > 3.0 + 1e-6 && up.z < 3.0 + 3e-6);
-        let down = offset_origin(
-            position,
-            Vec3::splat(1e-6),
-            Vec3::Z,
-            Vec3::new(1.0, 0.0, -0.1),
-        );
+        let down = offset_origin(position, Vec3::splat(1e-6), Vec3::Z, Vec3::new(1.0, 0.0, -0.1));
         assert!(down.z < 3.0 - 1e-6 && down.z > 3.0 - 3e-6);
-        assert_eq!(
-            offset_origin(position, Vec3::ZERO, Vec3::Z, Vec3::Z),
-            position
-        );
+        assert_eq!(offset_origin(position, Vec3::ZERO, Vec3::Z, Vec3::Z), position);
     }
 
     #[test]
     fn flat_normals_shift_nothing() {
         let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        assert_eq!(
-            terminator_shift(
-                Vec3::new(0.25, 0.5, 0.0),
-                points,
-                [Vec3::Z; 3],
-                [0.25, 0.25, 0.5]
-            ),
-            Vec3::ZERO
-        );
+        assert_eq!(terminator_shift(Vec3::new(0.25, 0.5, 0.0), points, [Vec3::Z; 3], [0.25, 0.25, 0.5]), Vec3::ZERO);
         for i in 0..10_000 {
             let points = [direction(4 * i), direction(4 * i + 1), direction(4 * i + 2)];
             let cross = (points[1] - points[0]).cross(points[2] - points[0]);
@@ -309,8 +246,7 @@ mod tests {
             }
             let [u, v] = unit_pair(8, i).map(|x| x * 0.5);
             let position = points[0] * (1.0 - u - v) + points[1] * u + points[2] * v;
-            let shift =
-                terminator_shift(position, points, [normalize(cross); 3], [1.0 - u - v, u, v]);
+            let shift = terminator_shift(position, points, [normalize(cross); 3], [1.0 - u - v, u, v]);
             assert!(shift.abs().max_element() < 4e-6, "{points:?}: {shift}");
         }
     }
@@ -318,11 +254,7 @@ mod tests {
     #[test]
     fn shift_leads_to_the_tangent_planes() {
         // A flat piece of a unit sphere: the shifted points lie between the triangle and a little above the sphere.
-        let points = [
-            direction(1),
-            normalize(direction(1) + Vec3::X * 0.2),
-            normalize(direction(1) + Vec3::Y * 0.2),
-        ];
+        let points = [direction(1), normalize(direction(1) + Vec3::X * 0.2), normalize(direction(1) + Vec3::Y * 0.2)];
         for i in 0..1000 {
             let [u, v] = unit_pair(8, i).map(|x| x * 0.5);
             let b = [1.0 - u - v, u, v];
@@ -336,29 +268,17 @@ mod tests {
                 (0..3).for_each(|a| offset[a] -= below * p[a]);
                 (0..3).for_each(|a| expected[a] += f64::from(b) * offset[a]);
             }
-            assert!(
-                minus(wide(shifted), expected)
-                    .iter()
-                    .all(|x| x.abs() < 5e-7),
-                "{shifted} {expected:?}"
-            );
+            assert!(minus(wide(shifted), expected).iter().all(|x| x.abs() < 5e-7), "{shifted} {expected:?}");
             assert!(shifted.dot(shifted) > position.dot(position) && shifted.dot(shifted) < 1.02);
             // Seen from inside, the surface is hollow, and nothing moves.
-            assert_eq!(
-                terminator_shift(position, points, points.map(|n| -n), b),
-                Vec3::ZERO
-            );
+            assert_eq!(terminator_shift(position, points, points.map(|n| -n), b), Vec3::ZERO);
         }
     }
 
     #[test]
     fn smooth_turns_normals_to_the_triangles_side() {
         let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        let normals = [
-            Vec3::new(-0.6, 0.0, 0.8),
-            Vec3::new(0.6, 0.0, 0.8),
-            Vec3::new(0.0, 0.6, 0.8),
-        ];
+        let normals = [Vec3::new(-0.6, 0.0, 0.8), Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.6, 0.8)];
         let b = [0.5, 0.25, 0.25];
         let flat = Surface {
             position: Vec3::new(0.25, 0.25, 0.0),
@@ -373,27 +293,12 @@ mod tests {
         let front = flat.smooth(points, normals, b);
         assert!(front.shading_normal.z > 0.9 && front.shadow_offset.z > 0.01);
         assert_eq!(front, flat.smooth(points, normals.map(|n| -n), b));
-        let back = Surface {
-            incoming: Vec3::Z,
-            ..flat
-        }
-        .smooth(points, normals, b);
-        assert_eq!(
-            (back.shading_normal, back.shadow_offset),
-            (front.shading_normal, Vec3::ZERO)
-        );
+        let back = Surface { incoming: Vec3::Z, ..flat }.smooth(points, normals, b);
+        assert_eq!((back.shading_normal, back.shadow_offset), (front.shading_normal, Vec3::ZERO));
         // Bent inwards, it is the back that bulges.
         let hollow = normals.map(|n| Vec3::new(-n.x, -n.y, n.z));
         assert_eq!(flat.smooth(points, hollow, b).shadow_offset, Vec3::ZERO);
-        assert!(
-            Surface {
-                incoming: Vec3::Z,
-                ..flat
-            }
-            .smooth(points, hollow, b)
-            .shadow_offset
-            .z < -0.01
-        );
+        assert!(Surface { incoming: Vec3::Z, ..flat }.smooth(points, hollow, b).shadow_offset.z < -0.01);
         assert_eq!(flat.smooth(points, [Vec3::ZERO; 3], b), flat);
         assert_eq!(flat.smooth(points, [Vec3::NAN; 3], b), flat);
     }
@@ -401,11 +306,7 @@ mod tests {
     fn check_packing(normal: Vec3) -> f64 {
         let back = wide(unpack_normal(pack_normal(normal)));
         let n = wide(normal);
-        let cross = [
-            n[1] * back[2] - n[2] * back[1],
-            n[2] * back[0] - n[0] * back[2],
-            n[0] * back[1] - n[1] * back[0],
-        ];
+        let cross = [n[1] * back[2] - n[2] * back[1], n[2] * back[0] - n[0] * back[2], n[0] * back[1] - n[1] * back[0]];
         assert!(dot(n, back) > 0.0, "{normal} {back:?}");
         assert!((dot(back, back) - 1.0).abs() < 3e-7);
         (dot(cross, cross) / dot(n, n)).sqrt()
@@ -413,9 +314,7 @@ mod tests {
 
     #[test]
     fn packed_normals_are_close() {
-        let worst = (0..1_000_000)
-            .map(|i| check_packing(direction(i)))
-            .fold(0.0, f64::max);
+        let worst = (0..1_000_000).map(|i| check_packing(direction(i))).fold(0.0, f64::max);
         assert!(worst < 7e-5 && worst > 3e-5, "{worst}");
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             assert_eq!(unpack_normal(pack_normal(axis)), axis);
@@ -435,14 +334,7 @@ mod tests {
             let n = unpack_normal(i.wrapping_mul(0x9e37_79b9));
             assert!((n.dot(n) - 1.0).abs() < 1e-6);
         }
-        for bits in [
-            0x8000_8000,
-            0x8000_0000,
-            0x0000_8000,
-            0x7fff_7fff,
-            0x8001_8001,
-            0x7fff_8000,
-        ] {
+        for bits in [0x8000_8000, 0x8000_0000, 0x0000_8000, 0x7fff_7fff, 0x8001_8001, 0x7fff_8000] {
             let n = unpack_normal(bits);
             assert!((n.dot(n) - 1.0).abs() < 1e-6, "{bits:x} {n}");
         }

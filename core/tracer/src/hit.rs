@@ -2,7 +2,7 @@
 
 use hybray_bintree::cut::FLAT;
 use hybray_bintree::walk::Hit;
-use hybray_geometry::{RayKernel, SurfacePoint, Vec3, gamma};
+use hybray_geometry::{Ray, RayKernel, SurfacePoint, Vec3, gamma};
 use hybray_scene::{BLOCK, Kind, PageView, Slot};
 use hybray_shading::{Surface, unpack_normal};
 use hybray_wire::RayRecord;
@@ -66,42 +66,48 @@ impl HitRecord {
     };
 }
 
-/// Works out the place of `hit`, found by `ray` in `page`.
+/// The place of `hit` on its primitive, found by `ray` in `page`.
+#[must_use]
+pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint {
+    let kernel = RayKernel::new(ray);
+    let (t, slot) = (hit.candidate.t, hit.slot);
+    let (block, lane) = (slot.number() / BLOCK, slot.number() % BLOCK);
+    match slot.kind() {
+        Kind::Triangle => page.triangles[block].get(lane).surface(&kernel, t),
+        Kind::Sphere => page.spheres[block].get(lane).surface(&kernel, t),
+        Kind::Cone => page.cones[slot.number()].get().surface(&kernel, t),
+    }
+}
+
+/// What shading sees of `hit`.
 ///
 /// The error given to shading is that of the position, and as much again with a rounding of the coordinates for the
 /// test that a ray starting there will be put to.
 #[must_use]
 pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
-    let kernel = RayKernel::new(&ray.ray());
-    let (t, slot) = (hit.candidate.t, hit.slot);
-    let (block, lane) = (slot.number() / BLOCK, slot.number() % BLOCK);
-    let at = |point: SurfacePoint| Surface {
+    let point = surface_point(page, &ray.ray(), hit);
+    let flat = Surface {
         position: point.position,
         error: point.error * 2.0 + point.position.abs() * gamma(4),
         geometric_normal: point.normal,
         shading_normal: point.normal,
         shadow_offset: Vec3::ZERO,
         incoming: ray.direction.into(),
-        material: page.material(slot),
+        material: page.material(hit.slot),
         medium: ray.medium,
     };
-    match slot.kind() {
-        Kind::Triangle => {
-            let triangle = page.triangles[block].get(lane);
-            let point = triangle.surface(&kernel, t);
-            match vertex_normals(page, slot) {
-                Some(packed) => {
-                    let [u, v] = point.uv;
-                    at(point).smooth(triangle.v, packed.map(unpack_normal), [1.0 - u - v, u, v])
-                }
-                None => at(point),
-            }
+    match vertex_normals(page, hit.slot) {
+        Some(packed) => {
+            let number = hit.slot.number();
+            let corners = page.triangles[number / BLOCK].get(number % BLOCK).v;
+            let [u, v] = point.uv;
+            flat.smooth(corners, packed.map(unpack_normal), [1.0 - u - v, u, v])
         }
-        Kind::Sphere => at(page.spheres[block].get(lane).surface(&kernel, t)),
-        Kind::Cone => at(page.cones[slot.number()].get().surface(&kernel, t)),
+        None => flat,
     }
 }
 
 fn vertex_normals(page: &PageView<'_>, slot: Slot) -> Option<[u32; 3]> {
-    page.normals.get(slot.number()).copied().filter(|packed| !packed.contains(&FLAT))
+    let triangle = slot.kind() == Kind::Triangle;
+    page.normals.get(slot.number()).filter(|_| triangle).copied().filter(|packed| !packed.contains(&FLAT))
 }

@@ -174,7 +174,8 @@ impl<'r> Lane<'r> {
             depth: record.depth + 1,
             ..RayRecord::zeroed()
         };
-        let hit = walker.nearest(scene, &Ray { origin: start, direction: Vec3::from_array(ray.direction), ..ray.ray() });
+        let hit =
+            walker.nearest(scene, &Ray { origin: start, direction: Vec3::from_array(ray.direction), ..ray.ray() });
         self.start(scene, &ray, &hit, sink, counts);
     }
 }

@@ -10,6 +10,6 @@ mod hit;
 mod lane;
 mod scene;
 
-pub use hit::{HitRecord, Origin, surface};
+pub use hit::{HitRecord, Origin, surface, surface_point};
 pub use lane::{Lane, Sink, Walker};
 pub use scene::Scene;

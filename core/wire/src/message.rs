@@ -105,6 +105,8 @@ pub enum Message {
         width: u8,
         /// Rows of the tile.
         height: u8,
+        /// Rays that ended: for people to watch.
+        rays: u32,
         /// Sum of the ledger entries of the rays that ended.
         entry: u64,
     },
@@ -243,8 +245,15 @@ mod tests {
         check(Message::Begin(FRAME));
         check(Message::Tiles { first: 3, count: u32::MAX, epoch: 65535 });
         check(Message::Done { first: 3, count: 1, nanoseconds: u64::MAX });
-        check(Message::Contributions { tile: u32::MAX, epoch: 65535, width: 8, height: 8, entry: u64::MAX });
-        check(Message::Contributions { tile: 0, epoch: 0, width: 3, height: 1, entry: 0 });
+        check(Message::Contributions {
+            tile: u32::MAX,
+            epoch: 65535,
+            width: 8,
+            height: 8,
+            rays: u32::MAX,
+            entry: u64::MAX,
+        });
+        check(Message::Contributions { tile: 0, epoch: 0, width: 3, height: 1, rays: 0, entry: 0 });
         check(Message::Finished { tile: 9 });
         check(Message::Again { tile: 9, epoch: 1 });
         let most = u64::MAX;

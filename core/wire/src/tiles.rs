@@ -95,12 +95,7 @@ impl TileMap {
         let (x, y) = (column * TILE, (2 * strip + row) * TILE);
         let left = self.width - x;
         let below = self.height - y;
-        Tile {
-            x,
-            y,
-            width: if left < TILE { left } else { TILE },
-            height: if below < TILE { below } else { TILE },
-        }
+        Tile { x, y, width: if left < TILE { left } else { TILE }, height: if below < TILE { below } else { TILE } }
     }
 
     /// How many tiles from `number` on, of the next `count`, make one square of 16 pixels (4), or stand alone (1).

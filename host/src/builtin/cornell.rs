@@ -34,18 +34,9 @@ pub fn blocks() -> Model {
     let white = model.add_material("white", matt(WHITE));
     // Corners of the tops, counterclockwise seen from above.
     let short = [[130.0, 65.0], [82.0, 225.0], [240.0, 272.0], [290.0, 114.0]];
-    let tall = [
-        [423.0, 247.0],
-        [265.0, 296.0],
-        [314.0, 456.0],
-        [472.0, 406.0],
-    ];
+    let tall = [[423.0, 247.0], [265.0, 296.0], [314.0, 456.0], [472.0, 406.0]];
     for (name, footprint, height) in [("short-block", short, 165.0), ("tall-block", tall, 330.0)] {
-        model.meshes.push(Mesh {
-            name: name.to_owned(),
-            material: white,
-            ..block(footprint, height)
-        });
+        model.meshes.push(Mesh { name: name.to_owned(), material: white, ..block(footprint, height) });
         model.objects.polygons += 5;
     }
     model
@@ -54,28 +45,13 @@ pub fn blocks() -> Model {
 /// The box with a mirroring and a glass sphere in the blocks' places.
 pub fn spheres() -> Model {
     let mut model = room();
-    let mirror = Material {
-        diffuse: [0.0; 3],
-        mirror: [0.95; 3],
-        ..Material::MATT
-    };
-    let glass = Material {
-        diffuse: [0.0; 3],
-        transmission: [1.0; 3],
-        ior: 1.5,
-        flags: Material::FRESNEL,
-        ..Material::MATT
-    };
-    for (name, material, centre) in [
-        ("mirror", mirror, [390.0, 100.0, 370.0]),
-        ("glass", glass, [175.0, 100.0, 190.0]),
-    ] {
+    let mirror = Material { diffuse: [0.0; 3], mirror: [0.95; 3], ..Material::MATT };
+    let glass =
+        Material { diffuse: [0.0; 3], transmission: [1.0; 3], ior: 1.5, flags: Material::FRESNEL, ..Material::MATT };
+    for (name, material, centre) in [("mirror", mirror, [390.0, 100.0, 370.0]), ("glass", glass, [175.0, 100.0, 190.0])]
+    {
         let material = model.add_material(name, material);
-        model.spheres.push(Sphere {
-            centre,
-            radius: 100.0,
-            material,
-        });
+        model.spheres.push(Sphere { centre, radius: 100.0, material });
     }
     model.objects.spheres = 2;
     model
@@ -97,53 +73,18 @@ fn room() -> Model {
         }],
         ambient: [0.10, 0.085, 0.06],
         // A ray goes into the glass, out of it, to the mirror and on.
-        settings: Settings {
-            depth: Some(8),
-            ..Settings::default()
-        },
-        objects: Objects {
-            polygons: 6,
-            ..Objects::default()
-        },
+        settings: Settings { depth: Some(8), ..Settings::default() },
+        objects: Objects { polygons: 6, ..Objects::default() },
         ..Model::default()
     };
-    let floor = quad([
-        [552.8, 0.0, 0.0],
-        [0.0; 3],
-        [0.0, 0.0, 559.2],
-        [549.6, 0.0, 559.2],
-    ]);
-    let back = [
-        [549.6, 0.0, 559.2],
-        [0.0, 0.0, 559.2],
-        [0.0, CEILING, 559.2],
-        [556.0, CEILING, 559.2],
-    ];
-    let right = [
-        [0.0, 0.0, 559.2],
-        [0.0; 3],
-        [0.0, CEILING, 0.0],
-        [0.0, CEILING, 559.2],
-    ];
-    let left = [
-        [552.8, 0.0, 0.0],
-        [549.6, 0.0, 559.2],
-        [556.0, CEILING, 559.2],
-        [556.0, CEILING, 0.0],
-    ];
+    let floor = quad([[552.8, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 559.2], [549.6, 0.0, 559.2]]);
+    let back = [[549.6, 0.0, 559.2], [0.0, 0.0, 559.2], [0.0, CEILING, 559.2], [556.0, CEILING, 559.2]];
+    let right = [[0.0, 0.0, 559.2], [0.0; 3], [0.0, CEILING, 0.0], [0.0, CEILING, 559.2]];
+    let left = [[552.8, 0.0, 0.0], [549.6, 0.0, 559.2], [556.0, CEILING, 559.2], [556.0, CEILING, 0.0]];
     let [x0, x1] = LAMP_X;
     let [z0, z1] = LAMP_Z;
-    let panel = [
-        [x1, CEILING, z0],
-        [x1, CEILING, z1],
-        [x0, CEILING, z1],
-        [x0, CEILING, z0],
-    ];
-    let lit = Material {
-        diffuse: [0.0; 3],
-        emission: radiance(),
-        ..Material::MATT
-    };
+    let panel = [[x1, CEILING, z0], [x1, CEILING, z1], [x0, CEILING, z1], [x0, CEILING, z0]];
+    let lit = Material { diffuse: [0.0; 3], emission: radiance(), ..Material::MATT };
     for (name, mesh, material) in [
         ("floor", floor, matt(WHITE)),
         ("ceiling", ceiling(panel), matt(WHITE)),
@@ -159,22 +100,14 @@ fn room() -> Model {
             _ => "white",
         };
         let material = model.add_material(colour, material);
-        model.meshes.push(Mesh {
-            name: name.to_owned(),
-            material,
-            ..mesh
-        });
+        model.meshes.push(Mesh { name: name.to_owned(), material, ..mesh });
     }
     model
 }
 
 /// Matt, and in the ambient light of the same colour.
 fn matt(colour: P) -> Material {
-    Material {
-        diffuse: colour,
-        ambient: colour,
-        ..Material::MATT
-    }
+    Material { diffuse: colour, ambient: colour, ..Material::MATT }
 }
 
 /// Distance from the light to the floor.
@@ -204,31 +137,18 @@ fn radiance() -> P {
 }
 
 fn quad(corners: [P; 4]) -> Mesh {
-    Mesh {
-        positions: corners.to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Mesh::default()
-    }
+    Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
 }
 
 /// The ceiling around the opening for the lamp, four quadrilaterals without vertices on edges.
 fn ceiling(opening: [P; 4]) -> Mesh {
-    let outer = [
-        [556.0, CEILING, 0.0],
-        [556.0, CEILING, 559.2],
-        [0.0, CEILING, 559.2],
-        [0.0, CEILING, 0.0],
-    ];
+    let outer = [[556.0, CEILING, 0.0], [556.0, CEILING, 559.2], [0.0, CEILING, 559.2], [0.0, CEILING, 0.0]];
     let sides = (0..4).flat_map(|i| {
         let next = (i + 1) % 4;
         [[i, next, next + 4], [i, next + 4, i + 4]]
     });
     let triangles = sides.collect();
-    Mesh {
-        positions: [outer, opening].concat(),
-        triangles,
-        ..Mesh::default()
-    }
+    Mesh { positions: [outer, opening].concat(), triangles, ..Mesh::default() }
 }
 
 /// A block without a bottom, which would lie in the floor.
@@ -239,11 +159,7 @@ fn block(footprint: [[f32; 2]; 4], height: f32) -> Mesh {
         let next = (i + 1) % 4;
         triangles.extend([[next, i, i + 4], [next, i + 4, next + 4]]);
     }
-    Mesh {
-        positions: [corners(height), corners(0.0)].concat(),
-        triangles,
-        ..Mesh::default()
-    }
+    Mesh { positions: [corners(height), corners(0.0)].concat(), triangles, ..Mesh::default() }
 }
 
 #[cfg(test)]
@@ -262,10 +178,7 @@ mod tests {
         // Published: floor, lamp, ceiling, three walls, two blocks of five faces.
         assert_eq!(blocks().objects.polygons, 16);
         assert_eq!(blocks().primitives(), 5 * 2 + 8 + 2 * 10);
-        assert_eq!(
-            (spheres().objects.polygons, spheres().objects.spheres),
-            (6, 2)
-        );
+        assert_eq!((spheres().objects.polygons, spheres().objects.spheres), (6, 2));
     }
 
     /// Every wall faces the middle of the room; every face of a block faces away from the block's middle.
@@ -274,15 +187,8 @@ mod tests {
         let model = blocks();
         for (i, mesh) in model.meshes.iter().enumerate() {
             let count = mesh.positions.len() as f64;
-            let sum = mesh
-                .positions
-                .iter()
-                .fold([0.0; 3], |s, p| [0, 1, 2].map(|k| s[k] + f64::from(p[k])));
-            let middle = if i < 6 {
-                [278.0, 274.0, 280.0]
-            } else {
-                scale(sum, 1.0 / count)
-            };
+            let sum = mesh.positions.iter().fold([0.0; 3], |s, p| [0, 1, 2].map(|k| s[k] + f64::from(p[k])));
+            let middle = if i < 6 { [278.0, 274.0, 280.0] } else { scale(sum, 1.0 / count) };
             for t in &mesh.triangles {
                 let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
                 let inward = dot(cross(sub(b, a), sub(c, a)), sub(middle, a)) > 0.0;
@@ -337,11 +243,7 @@ mod tests {
     fn light_hangs_free_of_the_panel() {
         let light = lamp();
         let model = room();
-        let panel = model
-            .meshes
-            .iter()
-            .find(|m| m.name == "lamp")
-            .expect("a lamp");
+        let panel = model.meshes.iter().find(|m| m.name == "lamp").expect("a lamp");
         assert!(panel.positions.iter().all(|p| p[1] > light.position[1]));
         let shines = cross(light.u.map(f64::from), light.v.map(f64::from));
         assert!(shines[1] < 0.0 && shines[0] == 0.0 && shines[2] == 0.0);

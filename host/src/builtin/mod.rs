@@ -56,10 +56,7 @@ enum Maker {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BuiltinError {
     /// No such scene in a family that is there.
-    #[error(
-        "there is no built-in scene `{name}`{}; there are {known}",
-        hint(nearest)
-    )]
+    #[error("there is no built-in scene `{name}`{}; there are {known}", hint(nearest))]
     Unknown {
         /// As given.
         name: String,
@@ -103,10 +100,7 @@ pub fn names() -> &'static [BuiltinScene] {
 #[must_use]
 pub fn builtin(name: &str) -> Option<Result<Model, BuiltinError>> {
     let family = family_of(name);
-    SCENES
-        .iter()
-        .any(|s| family_of(s.name) == family)
-        .then(|| make(name, family))
+    SCENES.iter().any(|s| family_of(s.name) == family).then(|| make(name, family))
 }
 
 fn family_of(name: &str) -> &str {
@@ -122,40 +116,19 @@ fn make(name: &str, family: &str) -> Result<Model, BuiltinError> {
         });
     }
     let (head, given) = name.rsplit_once(':').unwrap_or((name, ""));
-    if let Some(BuiltinScene {
-        name: scene,
-        size: Some(size),
-        make: Maker::Sized(make),
-        ..
-    }) = find(head)
-    {
+    if let Some(BuiltinScene { name: scene, size: Some(size), make: Maker::Sized(make), .. }) = find(head) {
         let sizes = size.smallest..=size.largest;
         return match given.parse() {
             Ok(number) if sizes.contains(&number) => Ok(make(number)),
-            _ => Err(BuiltinError::Size {
-                scene,
-                given: given.to_owned(),
-                size: *size,
-            }),
+            _ => Err(BuiltinError::Size { scene, given: given.to_owned(), size: *size }),
         };
     }
-    let siblings = || {
-        SCENES
-            .iter()
-            .map(|s| s.name)
-            .filter(|s| family_of(s) == family)
-    };
+    let siblings = || SCENES.iter().map(|s| s.name).filter(|s| family_of(s) == family);
     // A size may stand behind a misspelt name.
     let distance = |scene: &&str| edits(name, scene).min(edits(head, scene));
-    let nearest = siblings()
-        .min_by_key(distance)
-        .filter(|scene| distance(scene) <= 3);
+    let nearest = siblings().min_by_key(distance).filter(|scene| distance(scene) <= 3);
     let known: Vec<_> = siblings().collect();
-    Err(BuiltinError::Unknown {
-        name: name.to_owned(),
-        nearest,
-        known: known.join(", "),
-    })
+    Err(BuiltinError::Unknown { name: name.to_owned(), nearest, known: known.join(", ") })
 }
 
 /// Levenshtein's distance: letters to insert, drop or replace.
@@ -181,123 +154,28 @@ const fn sized(
     counts: &'static str,
     [smallest, default, largest]: [u32; 3],
 ) -> BuiltinScene {
-    BuiltinScene {
-        name,
-        about,
-        size: Some(Size {
-            default,
-            smallest,
-            largest,
-            counts,
-        }),
-        make: Maker::Sized(make),
-    }
+    BuiltinScene { name, about, size: Some(Size { default, smallest, largest, counts }), make: Maker::Sized(make) }
 }
 
 const fn fixed(name: &'static str, about: &'static str, make: fn() -> Model) -> BuiltinScene {
-    BuiltinScene {
-        name,
-        about,
-        size: None,
-        make: Maker::Fixed(make),
-    }
+    BuiltinScene { name, about, size: None, make: Maker::Fixed(make) }
 }
 
 static SCENES: [BuiltinScene; 14] = [
-    sized(
-        "spd:balls",
-        "SPD: the sphereflake over a square",
-        spd::balls,
-        "levels of spheres",
-        [1, 4, 7],
-    ),
-    sized(
-        "spd:balls-noground",
-        "SPD: the sphereflake alone",
-        spd::balls_noground,
-        "levels of spheres",
-        [1, 4, 7],
-    ),
-    sized(
-        "spd:gears",
-        "SPD: meshed gears, some of them clear",
-        spd::gears,
-        "gears along each side",
-        [1, 4, 32],
-    ),
-    sized(
-        "spd:lattice",
-        "SPD: shiny balls joined by rods",
-        spd::lattice,
-        "cells along each side",
-        [1, 12, 170],
-    ),
-    sized(
-        "spd:mount",
-        "SPD: a fractal mountain and glass balls",
-        spd::mount,
-        "halvings of the grid",
-        [1, 6, 11],
-    ),
-    sized(
-        "spd:rings",
-        "SPD: a pyramid of interlocking rings",
-        spd::rings,
-        "layers of the pyramid",
-        [1, 7, 99],
-    ),
-    sized(
-        "spd:sombrero",
-        "SPD: a height field of waves",
-        spd::sombrero,
-        "1 + doublings of 32 x 32",
-        [1, 1, 7],
-    ),
-    sized(
-        "spd:teapot",
-        "SPD: the teapot on a checkerboard",
-        spd::teapot,
-        "cells along a patch",
-        [2, 12, 550],
-    ),
-    sized(
-        "spd:tetra",
-        "SPD: a recursive tetrahedron",
-        spd::tetra,
-        "levels",
-        [1, 6, 12],
-    ),
-    sized(
-        "spd:tree",
-        "SPD: a tree under seven lights",
-        spd::tree,
-        "levels of branches",
-        [1, 11, 22],
-    ),
-    sized(
-        "terrain",
-        "fractal mountains",
-        terrain::terrain,
-        "triangles",
-        [2, 1_000_000, PRIMITIVES_MAX],
-    ),
-    fixed(
-        "cornell",
-        "the Cornell box with its two blocks",
-        cornell::blocks,
-    ),
-    fixed(
-        "cornell:mirror",
-        "the Cornell box with a mirror and a glass sphere",
-        cornell::spheres,
-    ),
-    sized(
-        "organic",
-        "a closed knotted tube",
-        organic::organic,
-        "triangles",
-        [200, 70_000, PRIMITIVES_MAX],
-    ),
+    sized("spd:balls", "SPD: the sphereflake over a square", spd::balls, "levels of spheres", [1, 4, 7]),
+    sized("spd:balls-noground", "SPD: the sphereflake alone", spd::balls_noground, "levels of spheres", [1, 4, 7]),
+    sized("spd:gears", "SPD: meshed gears, some of them clear", spd::gears, "gears along each side", [1, 4, 32]),
+    sized("spd:lattice", "SPD: shiny balls joined by rods", spd::lattice, "cells along each side", [1, 12, 170]),
+    sized("spd:mount", "SPD: a fractal mountain and glass balls", spd::mount, "halvings of the grid", [1, 6, 11]),
+    sized("spd:rings", "SPD: a pyramid of interlocking rings", spd::rings, "layers of the pyramid", [1, 7, 99]),
+    sized("spd:sombrero", "SPD: a height field of waves", spd::sombrero, "1 + doublings of 32 x 32", [1, 1, 7]),
+    sized("spd:teapot", "SPD: the teapot on a checkerboard", spd::teapot, "cells along a patch", [2, 12, 550]),
+    sized("spd:tetra", "SPD: a recursive tetrahedron", spd::tetra, "levels", [1, 6, 12]),
+    sized("spd:tree", "SPD: a tree under seven lights", spd::tree, "levels of branches", [1, 11, 22]),
+    sized("terrain", "fractal mountains", terrain::terrain, "triangles", [2, 1_000_000, PRIMITIVES_MAX]),
+    fixed("cornell", "the Cornell box with its two blocks", cornell::blocks),
+    fixed("cornell:mirror", "the Cornell box with a mirror and a glass sphere", cornell::spheres),
+    sized("organic", "a closed knotted tube", organic::organic, "triangles", [200, 70_000, PRIMITIVES_MAX]),
 ];
 
 #[cfg(test)]
@@ -306,26 +184,14 @@ mod tests {
 
     #[test]
     fn other_names_are_files() {
-        for name in [
-            "teapot.obj",
-            "balls",
-            "./cornell",
-            "C:/spd:balls",
-            "spds:balls",
-            "",
-            ":",
-            "Cornell",
-        ] {
+        for name in ["teapot.obj", "balls", "./cornell", "C:/spd:balls", "spds:balls", "", ":", "Cornell"] {
             assert!(builtin(name).is_none(), "{name}");
         }
     }
 
     #[track_caller]
     fn fails(name: &str, expected: &str) {
-        let error = builtin(name)
-            .expect("a built-in family")
-            .expect_err("no scene")
-            .to_string();
+        let error = builtin(name).expect("a built-in family").expect_err("no scene").to_string();
         assert_eq!(error, expected);
     }
 
@@ -333,41 +199,15 @@ mod tests {
     fn errors_say_what_would_do() {
         let spd = "there are spd:balls, spd:balls-noground, spd:gears, spd:lattice, spd:mount, spd:rings, \
                    spd:sombrero, spd:teapot, spd:tetra, spd:tree";
-        fails(
-            "spd:bals:4",
-            &format!("there is no built-in scene `spd:bals:4` (did you mean `spd:balls`?); {spd}"),
-        );
-        fails(
-            "spd:trees",
-            &format!("there is no built-in scene `spd:trees` (did you mean `spd:tree`?); {spd}"),
-        );
-        fails(
-            "spd:shells",
-            &format!("there is no built-in scene `spd:shells` (did you mean `spd:balls`?); {spd}"),
-        );
-        fails(
-            "spd:hypercube",
-            &format!("there is no built-in scene `spd:hypercube`; {spd}"),
-        );
+        fails("spd:bals:4", &format!("there is no built-in scene `spd:bals:4` (did you mean `spd:balls`?); {spd}"));
+        fails("spd:trees", &format!("there is no built-in scene `spd:trees` (did you mean `spd:tree`?); {spd}"));
+        fails("spd:shells", &format!("there is no built-in scene `spd:shells` (did you mean `spd:balls`?); {spd}"));
+        fails("spd:hypercube", &format!("there is no built-in scene `spd:hypercube`; {spd}"));
         fails("spd", &format!("there is no built-in scene `spd`; {spd}"));
         let cornell = "there are cornell, cornell:mirror";
-        fails(
-            "cornell:4",
-            &format!("there is no built-in scene `cornell:4` (did you mean `cornell`?); {cornell}"),
-        );
-        let balls =
-            "is no size for `spd:balls`: it takes a whole number from 1 to 7 (levels of spheres)";
-        for given in [
-            "8",
-            "0",
-            "-1",
-            "4.5",
-            "",
-            "four",
-            "99999999999999999999",
-            " 4",
-            "4 ",
-        ] {
+        fails("cornell:4", &format!("there is no built-in scene `cornell:4` (did you mean `cornell`?); {cornell}"));
+        let balls = "is no size for `spd:balls`: it takes a whole number from 1 to 7 (levels of spheres)";
+        for given in ["8", "0", "-1", "4.5", "", "four", "99999999999999999999", " 4", "4 "] {
             fails(&format!("spd:balls:{given}"), &format!("`{given}` {balls}"));
         }
         fails(
@@ -378,12 +218,7 @@ mod tests {
 
     #[test]
     fn edit_distance() {
-        for (a, b, expected) in [
-            ("", "", 0),
-            ("abc", "", 3),
-            ("kitten", "sitting", 3),
-            ("flaw", "lawn", 2),
-        ] {
+        for (a, b, expected) in [("", "", 0), ("abc", "", 3), ("kitten", "sitting", 3), ("flaw", "lawn", 2)] {
             assert_eq!((edits(a, b), edits(b, a)), (expected, expected));
         }
     }
@@ -392,11 +227,7 @@ mod tests {
     fn names_are_distinct_and_sizes_ordered() {
         for (i, scene) in SCENES.iter().enumerate() {
             assert!(SCENES[..i].iter().all(|s| s.name != scene.name));
-            assert!(
-                scene
-                    .size
-                    .is_none_or(|s| s.smallest <= s.default && s.default <= s.largest)
-            );
+            assert!(scene.size.is_none_or(|s| s.smallest <= s.default && s.default <= s.largest));
             assert_eq!(scene.size.is_some(), matches!(scene.make, Maker::Sized(_)));
         }
     }
@@ -428,15 +259,8 @@ mod tests {
                 continue;
             };
             let at = |n: u32| primitives(scene.name, u64::from(n));
-            assert!(
-                at(size.largest) <= u64::from(PRIMITIVES_MAX),
-                "{}",
-                scene.name
-            );
-            assert!(
-                at(size.largest + 1) > u64::from(PRIMITIVES_MAX)
-                    || at(size.largest + 1) == at(size.largest)
-            );
+            assert!(at(size.largest) <= u64::from(PRIMITIVES_MAX), "{}", scene.name);
+            assert!(at(size.largest + 1) > u64::from(PRIMITIVES_MAX) || at(size.largest + 1) == at(size.largest));
             for n in [size.smallest, size.smallest + 1, size.smallest + 2] {
                 assert_eq!(make(n).primitives() as u64, at(n), "{}:{n}", scene.name);
             }
@@ -452,12 +276,7 @@ mod tests {
                 continue;
             };
             let model = make(size.largest);
-            assert_eq!(
-                model.primitives() as u64,
-                primitives(scene.name, u64::from(size.largest)),
-                "{}",
-                scene.name
-            );
+            assert_eq!(model.primitives() as u64, primitives(scene.name, u64::from(size.largest)), "{}", scene.name);
             checks::sound(&model);
         }
     }

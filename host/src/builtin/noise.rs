@@ -6,12 +6,8 @@
 /// Mixes all bits of a lattice point and an octave.
 fn hash(x: i32, y: i32, octave: u32) -> u32 {
     let mut h = (x as u32).wrapping_mul(0x9E37_79B1);
-    h = (h ^ (h >> 15))
-        .wrapping_add(y as u32)
-        .wrapping_mul(0x85EB_CA6B);
-    h = (h ^ (h >> 13))
-        .wrapping_add(octave)
-        .wrapping_mul(0xC2B2_AE35);
+    h = (h ^ (h >> 15)).wrapping_add(y as u32).wrapping_mul(0x85EB_CA6B);
+    h = (h ^ (h >> 13)).wrapping_add(octave).wrapping_mul(0xC2B2_AE35);
     h = (h ^ (h >> 16)).wrapping_mul(0x27D4_EB2F);
     h ^ (h >> 15)
 }
@@ -47,10 +43,7 @@ pub fn ridges(x: f64, y: f64, octaves: u32) -> f64 {
         weight = (ridge * 1.8).min(1.0);
         strength *= 0.48;
         // Twice as fine and turned by the angle of a 3-4-5 triangle, so that no lattice direction shows.
-        (x, y) = (
-            2.0 * (0.8 * x - 0.6 * y) + 17.0,
-            2.0 * (0.6 * x + 0.8 * y) - 31.0,
-        );
+        (x, y) = (2.0 * (0.8 * x - 0.6 * y) + 17.0, 2.0 * (0.6 * x + 0.8 * y) - 31.0);
     }
     sum
 }
@@ -81,10 +74,7 @@ mod tests {
             }
         }
         // 1,250 expected in each, standard deviation 33.
-        assert!(
-            counts.iter().all(|c| (1_100..1_400).contains(c)),
-            "{counts:?}"
-        );
+        assert!(counts.iter().all(|c| (1_100..1_400).contains(c)), "{counts:?}");
     }
 
     #[test]

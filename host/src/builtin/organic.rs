@@ -23,17 +23,11 @@ pub fn organic(triangles: u32) -> Model {
     let triangles = triangles - triangles % 2;
     let skin = [0.74, 0.47, 0.31];
     let mut model = Model {
-        lights: vec![
-            light([-0.55, 0.45, -0.7], [1.15, 1.1, 1.0]),
-            light([0.8, 0.3, -0.25], [0.25, 0.28, 0.35]),
-        ],
+        lights: vec![light([-0.55, 0.45, -0.7], [1.15, 1.1, 1.0]), light([0.8, 0.3, -0.25], [0.25, 0.28, 0.35])],
         cameras: vec![camera()],
         background: [0.16, 0.18, 0.21],
         ambient: [0.1; 3],
-        objects: Objects {
-            polygons: u64::from(triangles),
-            ..Objects::default()
-        },
+        objects: Objects { polygons: u64::from(triangles), ..Objects::default() },
         ..Model::default()
     };
     let material = Material {
@@ -45,23 +39,13 @@ pub fn organic(triangles: u32) -> Model {
         ..Material::MATT
     };
     let material = model.add_material("skin", material);
-    model.meshes.push(Mesh {
-        name: "organic".to_owned(),
-        material,
-        ..tube(triangles)
-    });
+    model.meshes.push(Mesh { name: "organic".to_owned(), material, ..tube(triangles) });
     model
 }
 
 fn light(along: V, colour: [f32; 3]) -> Light {
     let axis = narrow(unit(along));
-    Light {
-        kind: LightKind::Directional as u32,
-        axis,
-        colour,
-        samples: 1,
-        ..Light::default()
-    }
+    Light { kind: LightKind::Directional as u32, axis, colour, samples: 1, ..Light::default() }
 }
 
 fn camera() -> CameraSpec {
@@ -90,24 +74,17 @@ fn tube(triangles: u32) -> Mesh {
         triangles: Vec::with_capacity(triangles as usize),
         ..Mesh::default()
     };
-    let mut row = Row {
-        first: 0,
-        segments: around + u32::from(longer > 0),
-    };
+    let mut row = Row { first: 0, segments: around + u32::from(longer > 0) };
     let start = row;
     for i in 0..rings {
         let t = 2.0 * PI * f64::from(i) / f64::from(rings);
         let frame = Frame::at(t);
-        let point =
-            |j: u32| narrow(frame.skin(t, 2.0 * PI * f64::from(j) / f64::from(row.segments)));
+        let point = |j: u32| narrow(frame.skin(t, 2.0 * PI * f64::from(j) / f64::from(row.segments)));
         mesh.positions.extend((0..row.segments).map(point));
         let next = if i + 1 == rings {
             start
         } else {
-            Row {
-                first: row.first + row.segments,
-                segments: around + u32::from(i + 1 < longer),
-            }
+            Row { first: row.first + row.segments, segments: around + u32::from(i + 1 < longer) }
         };
         strip(row, next, true, i, &mut mesh.triangles);
         row = next;
@@ -131,15 +108,8 @@ impl Frame {
         let velocity = [c1 + 4.0 * c2, -s1 + 4.0 * s2, -3.0 * RISE * c3];
         let acceleration = [-s1 - 8.0 * s2, -c1 + 8.0 * c2, 9.0 * RISE * s3];
         let tangent = unit(velocity);
-        let normal = unit(sub(
-            acceleration,
-            scale(tangent, dot(acceleration, tangent)),
-        ));
-        Self {
-            point,
-            normal,
-            binormal: cross(tangent, normal),
-        }
+        let normal = unit(sub(acceleration, scale(tangent, dot(acceleration, tangent))));
+        Self { point, normal, binormal: cross(tangent, normal) }
     }
 
     /// The surface at the angle `a` around the tube: its radius swells and shrinks by whole waves along and around.
@@ -149,10 +119,7 @@ impl Frame {
             + WAVES[2] * libm::sin(23.0 * t - 4.0 * a + 1.0)
             + WAVES[3] * libm::sin(61.0 * t + 7.0 * a + 2.0);
         let radius = RADIUS * (1.0 + swell);
-        let across = add(
-            scale(self.normal, libm::cos(a)),
-            scale(self.binormal, libm::sin(a)),
-        );
+        let across = add(scale(self.normal, libm::cos(a)), scale(self.binormal, libm::sin(a)));
         add(self.point, scale(across, radius))
     }
 }
@@ -175,10 +142,7 @@ mod tests {
             // A torus: V - E + F = 0, with E = 3 F / 2.
             assert_eq!(2 * mesh.positions.len(), mesh.triangles.len());
             let mut used = vec![false; mesh.positions.len()];
-            mesh.triangles
-                .as_flattened()
-                .iter()
-                .for_each(|&v| used[v as usize] = true);
+            mesh.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
             assert!(used.iter().all(|&u| u));
         }
     }
@@ -200,14 +164,11 @@ mod tests {
     /// of the largest radii.
     #[test]
     fn does_not_run_into_itself() {
-        let points: Vec<V> = (0..600)
-            .map(|i| Frame::at(f64::from(i) * 2.0 * PI / 600.0).point)
-            .collect();
+        let points: Vec<V> = (0..600).map(|i| Frame::at(f64::from(i) * 2.0 * PI / 600.0).point).collect();
         for i in 0..600_usize {
             for j in i + 60..(i + 541).min(600) {
                 assert!(
-                    length(sub(points[i], points[j]))
-                        > 2.0 * RADIUS * (1.0 + WAVES.iter().sum::<f64>()),
+                    length(sub(points[i], points[j])) > 2.0 * RADIUS * (1.0 + WAVES.iter().sum::<f64>()),
                     "{i} {j}"
                 );
             }

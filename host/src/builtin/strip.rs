@@ -14,11 +14,7 @@ pub struct Row {
 
 impl Row {
     fn vertex(self, i: u32, closed: bool) -> u32 {
-        if closed && i == self.segments {
-            self.first
-        } else {
-            self.first + i
-        }
+        if closed && i == self.segments { self.first } else { self.first + i }
     }
 }
 
@@ -35,18 +31,10 @@ pub fn strip(a: Row, b: Row, closed: bool, parity: u32, out: &mut Vec<[u32; 3]>)
         let next_b = u64::from(j + 1) * u64::from(m);
         let tie_to_a = (i ^ parity) & 1 == 0;
         if j == n || (i < m && (next_a < next_b || (next_a == next_b && tie_to_a))) {
-            out.push([
-                a.vertex(i, closed),
-                a.vertex(i + 1, closed),
-                b.vertex(j, closed),
-            ]);
+            out.push([a.vertex(i, closed), a.vertex(i + 1, closed), b.vertex(j, closed)]);
             i += 1;
         } else {
-            out.push([
-                a.vertex(i, closed),
-                b.vertex(j + 1, closed),
-                b.vertex(j, closed),
-            ]);
+            out.push([a.vertex(i, closed), b.vertex(j + 1, closed), b.vertex(j, closed)]);
             j += 1;
         }
     }
@@ -58,30 +46,15 @@ mod tests {
 
     fn triangles(m: u32, n: u32, closed: bool) -> Vec<[u32; 3]> {
         let mut out = Vec::new();
-        let b = Row {
-            first: 100,
-            segments: n,
-        };
-        strip(
-            Row {
-                first: 0,
-                segments: m,
-            },
-            b,
-            closed,
-            0,
-            &mut out,
-        );
+        let b = Row { first: 100, segments: n };
+        strip(Row { first: 0, segments: m }, b, closed, 0, &mut out);
         out
     }
 
     #[test]
     fn grid_cell() {
         assert_eq!(triangles(1, 1, false), [[0, 1, 100], [1, 101, 100]]);
-        assert_eq!(
-            triangles(2, 1, false),
-            [[0, 1, 100], [1, 101, 100], [1, 2, 101]]
-        );
+        assert_eq!(triangles(2, 1, false), [[0, 1, 100], [1, 101, 100], [1, 2, 101]]);
         assert_eq!(triangles(3, 3, true)[5], [0, 100, 102]);
     }
 
@@ -99,11 +72,7 @@ mod tests {
     fn covers_the_strip_once() {
         for (m, n) in [(1, 1), (1, 7), (5, 6), (6, 5), (13, 4), (8, 8)] {
             let place = |v: u32| {
-                if v < 100 {
-                    [f64::from(v) / f64::from(m), 0.0]
-                } else {
-                    [f64::from(v - 100) / f64::from(n), 1.0]
-                }
+                if v < 100 { [f64::from(v) / f64::from(m), 0.0] } else { [f64::from(v - 100) / f64::from(n), 1.0] }
             };
             let area = |t: &[u32; 3]| {
                 let [p, q, r] = t.map(place);

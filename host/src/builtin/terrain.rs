@@ -24,23 +24,12 @@ pub fn terrain(triangles: u32) -> Model {
         cameras: vec![camera()],
         background: [0.45, 0.62, 0.85],
         ambient: [0.12, 0.15, 0.20],
-        objects: Objects {
-            polygons: u64::from(triangles),
-            ..Objects::default()
-        },
+        objects: Objects { polygons: u64::from(triangles), ..Objects::default() },
         ..Model::default()
     };
-    let material = Material {
-        diffuse: ground,
-        ambient: ground,
-        ..Material::MATT
-    };
+    let material = Material { diffuse: ground, ambient: ground, ..Material::MATT };
     let material = model.add_material("ground", material);
-    model.meshes.push(Mesh {
-        name: "terrain".to_owned(),
-        material,
-        ..sheet(triangles)
-    });
+    model.meshes.push(Mesh { name: "terrain".to_owned(), material, ..sheet(triangles) });
     model
 }
 
@@ -81,20 +70,12 @@ impl Plan {
         let strips = (f64::from(triangles) / 2.0).sqrt() as u32;
         let strips = strips.max(1);
         let segments = triangles / (2 * strips);
-        Self {
-            strips,
-            segments,
-            missing: triangles - 2 * strips * segments,
-        }
+        Self { strips, segments, missing: triangles - 2 * strips * segments }
     }
 
     /// Segments of row `i`, 0 to `strips`. Rows 1 to `missing / 2` are inner ones, for `missing < 2 strips`.
     fn row(&self, i: u32) -> u32 {
-        let longer = if i == self.strips {
-            self.missing % 2 == 1
-        } else {
-            (1..=self.missing / 2).contains(&i)
-        };
+        let longer = if i == self.strips { self.missing % 2 == 1 } else { (1..=self.missing / 2).contains(&i) };
         self.segments + u32::from(longer)
     }
 
@@ -117,10 +98,7 @@ fn sheet(triangles: u32) -> Mesh {
     };
     let mut below = None;
     for i in 0..=plan.strips {
-        let row = Row {
-            first: mesh.positions.len() as u32,
-            segments: plan.row(i),
-        };
+        let row = Row { first: mesh.positions.len() as u32, segments: plan.row(i) };
         let v = f64::from(i) / f64::from(plan.strips);
         let point = |j: u32| narrow(place(f64::from(j) / f64::from(row.segments), v, octaves));
         mesh.positions.extend((0..=row.segments).map(point));
@@ -134,11 +112,7 @@ fn sheet(triangles: u32) -> Mesh {
 
 /// The point over `u` and `v`, 0 to 1.
 fn place(u: f64, v: f64, octaves: u32) -> V {
-    [
-        2.0 * u - 1.0,
-        2.0 * v - 1.0,
-        RELIEF * ridges(u / COARSEST, v / COARSEST, octaves),
-    ]
+    [2.0 * u - 1.0, 2.0 * v - 1.0, RELIEF * ridges(u / COARSEST, v / COARSEST, octaves)]
 }
 
 #[cfg(test)]
@@ -158,17 +132,9 @@ mod tests {
         assert_eq!(mesh.positions.capacity(), mesh.positions.len());
         let rim = checks::open_edges(mesh);
         let plan = Plan::new(triangles);
-        assert_eq!(
-            rim as u32,
-            plan.row(0) + plan.row(plan.strips) + 2 * plan.strips,
-            "{triangles}"
-        );
+        assert_eq!(rim as u32, plan.row(0) + plan.row(plan.strips) + 2 * plan.strips, "{triangles}");
         let edges = (3 * mesh.triangles.len() + rim) / 2;
-        assert_eq!(
-            mesh.positions.len() + mesh.triangles.len(),
-            edges + 1,
-            "{triangles}"
-        );
+        assert_eq!(mesh.positions.len() + mesh.triangles.len(), edges + 1, "{triangles}");
         let mut area = 0.0;
         for t in &mesh.triangles {
             let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
@@ -191,9 +157,7 @@ mod tests {
     fn the_largest_plans_add_up() {
         for triangles in [19_999_999, 20_000_000, 12_345_679] {
             let plan = Plan::new(triangles);
-            let total: u32 = (0..plan.strips)
-                .map(|i| plan.row(i) + plan.row(i + 1))
-                .sum();
+            let total: u32 = (0..plan.strips).map(|i| plan.row(i) + plan.row(i + 1)).sum();
             assert_eq!(total, triangles);
         }
     }
@@ -201,11 +165,7 @@ mod tests {
     #[test]
     fn seen_whole_at_every_size() {
         for triangles in [2, 3, 100, 10_007, 200_000] {
-            assert_eq!(
-                checks::share_in_view(&tagged(triangles)),
-                1.0,
-                "{triangles}"
-            );
+            assert_eq!(checks::share_in_view(&tagged(triangles)), 1.0, "{triangles}");
         }
     }
 
@@ -222,9 +182,6 @@ mod tests {
         let mesh = &terrain(20_000).meshes[0];
         let heights = mesh.positions.iter().map(|p| p[2]);
         let (low, high) = heights.fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
-        assert!(
-            low >= 0.0 && high < 0.33 && high - low > 0.15,
-            "{low} {high}"
-        );
+        assert!(low >= 0.0 && high < 0.33 && high - low > 0.15, "{low} {high}");
     }
 }

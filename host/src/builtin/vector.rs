@@ -20,11 +20,7 @@ pub fn dot(a: V, b: V) -> f64 {
 }
 
 pub fn cross(a: V, b: V) -> V {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 pub fn length(a: V) -> f64 {
@@ -50,10 +46,7 @@ pub struct Affine {
 }
 
 impl Affine {
-    pub const IDENTITY: Self = Self {
-        m: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        t: [0.0; 3],
-    };
+    pub const IDENTITY: Self = Self { m: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], t: [0.0; 3] };
 
     /// Turns by the angle whose cosine and sine are given, counterclockwise seen from the tip of the unit vector
     /// `axis` (Rodrigues' formula).
@@ -74,20 +67,14 @@ impl Affine {
     }
 
     pub fn apply(&self, v: V) -> V {
-        add(
-            [dot(self.m[0], v), dot(self.m[1], v), dot(self.m[2], v)],
-            self.t,
-        )
+        add([dot(self.m[0], v), dot(self.m[1], v), dot(self.m[2], v)], self.t)
     }
 
     /// First `other`, then `self`.
     pub fn after(&self, other: &Self) -> Self {
         let column = |j: usize| [other.m[0][j], other.m[1][j], other.m[2][j]];
         let row = |i: usize| [0, 1, 2].map(|j| dot(self.m[i], column(j)));
-        Self {
-            m: [row(0), row(1), row(2)],
-            t: self.apply(other.t),
-        }
+        Self { m: [row(0), row(1), row(2)], t: self.apply(other.t) }
     }
 }
 
@@ -116,10 +103,7 @@ mod tests {
 
     #[test]
     fn maps_follow_one_another() {
-        let lift = Affine {
-            t: [0.0, 0.0, 1.0],
-            ..Affine::IDENTITY
-        };
+        let lift = Affine { t: [0.0, 0.0, 1.0], ..Affine::IDENTITY };
         let turn = Affine::turn_by(X, FRAC_PI_2);
         near(turn.after(&lift).apply([0.0; 3]), scale(Y, -1.0));
         near(lift.after(&turn).apply([0.0; 3]), Z);

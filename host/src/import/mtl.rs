@@ -206,7 +206,9 @@ fn material(m: &tobj::Material) -> Material {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<(Vec<(String, Material)>, Vec<String>), String> {
+    type Parsed = (Vec<(String, Material)>, Vec<String>);
+
+    fn parse(text: &str) -> Result<Parsed, String> {
         let mut warnings = Warnings::default();
         let found = read(text.as_bytes(), "m.mtl", &mut warnings).map_err(|e| e.to_string())?;
         Ok((found, warnings.lines("m.mtl").collect()))

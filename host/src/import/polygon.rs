@@ -119,7 +119,7 @@ impl Polygons {
     fn clip_ears(&mut self, corners: &[[f32; 3]]) {
         self.triangles.clear();
         self.earcut.earcut_slice(&self.flat, &[] as &[u32], &mut self.ears);
-        // Three corners of a polygon in the order of its ring turn as the polygon does.
+        // `earcut` promises no order; three corners of a polygon in the order of its ring turn as the polygon does.
         for ear in self.ears.chunks_exact(3) {
             let mut ear = [ear[0], ear[1], ear[2]];
             ear.sort_unstable();
@@ -128,44 +128,8 @@ impl Polygons {
                 self.triangles.push(ear);
             }
         }
-        self.put_back(corners);
         for triangle in &mut self.triangles {
             *triangle = triangle.map(|i| self.ring[i as usize]);
-        }
-    }
-
-    /// Ear clipping leaves out corners at which the ring goes straight on: split the triangle at whose edge each lies.
-    fn put_back(&mut self, corners: &[[f32; 3]]) {
-        let n = self.ring.len();
-        let mut used = vec![false; n];
-        for &i in self.triangles.iter().flatten() {
-            used[i as usize] = true;
-        }
-        for corner in 0..n {
-            if used[corner] {
-                continue;
-            }
-            let other = |step: usize| (1..n).map(|i| (corner + i * step) % n).find(|&i| used[i]);
-            let (Some(before), Some(after)) = (other(n - 1), other(1)) else { return };
-            let [p, q, r] = [before, corner, after].map(|i| self.flat[i]);
-            let (along, whole) = (dot(p, r, q), dot(p, r, r));
-            if !(0.0 < along && along < whole) {
-                continue;
-            }
-            let edge = [before as u32, after as u32];
-            let Some(at) = self.triangles.iter().position(|t| edge.iter().all(|e| t.contains(e))) else { continue };
-            let Some(&opposite) = self.triangles[at].iter().find(|i| !edge.contains(i)) else { continue };
-            let mut halves = [[edge[0], corner as u32, opposite], [corner as u32, edge[1], opposite]];
-            let whole = halves.iter().all(|half| {
-                let [a, b, c] = half.map(|i| corners[self.ring[i as usize] as usize]);
-                has_area(a, b, c)
-            });
-            if whole {
-                halves.iter_mut().for_each(|half| half.sort_unstable());
-                self.triangles[at] = halves[0];
-                self.triangles.push(halves[1]);
-                used[corner] = true;
-            }
         }
     }
 }
@@ -173,11 +137,6 @@ impl Polygons {
 /// Twice the signed area of a triangle in the plane.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
-/// `(b - o) . (c - o)`
-fn dot(o: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - o[0]) * (c[0] - o[0]) + (b[1] - o[1]) * (c[1] - o[1])
 }
 
 /// Whether three points span a triangle.
@@ -296,6 +255,31 @@ mod tests {
         let found = polygons.triangulate(&lift(&comb)).to_vec();
         assert_eq!(found.len(), comb.len() - 2);
         assert_eq!(found.iter().map(|t| shoelace(&t.map(|i| comb[i as usize]))).sum::<i64>(), shoelace(&comb));
+    }
+
+    /// Skylines with a corner at every step, so that most corners lie on straight edges: all stay corners of triangles.
+    #[test]
+    fn corners_on_straight_edges_stay() {
+        let mut choices = super::super::testing::Choices(12_345);
+        for _ in 0..2_000 {
+            let heights: Vec<i32> = (0..2 + choices.below(5)).map(|_| 1 + choices.below(4) as i32).collect();
+            let mut ring: Vec<[i32; 2]> = (0..heights.len() as i32).map(|x| [x, 0]).collect();
+            let mut y = 0;
+            for (i, &height) in heights.iter().enumerate().rev() {
+                while y != height {
+                    ring.push([i as i32 + 1, y]);
+                    y += (height - y).signum();
+                }
+                ring.push([i as i32 + 1, y]);
+            }
+            ring.extend((1..=y).rev().map(|y| [0, y]));
+            let start = choices.below(ring.len());
+            ring.rotate_left(start);
+            let mut polygons = Polygons::new();
+            let found = polygons.triangulate(&lift(&ring));
+            assert_eq!(found.len(), ring.len() - 2, "{ring:?}");
+            assert_eq!(found.iter().map(|t| shoelace(&t.map(|i| ring[i as usize]))).sum::<i64>(), shoelace(&ring));
+        }
     }
 
     #[test]

@@ -224,6 +224,7 @@ mod tests {
         // Of the standard's published table: 188 is the byte nearest to half.
         let half = linear(188);
         assert!((half - 0.5029).abs() < 1e-4, "{half}");
+        assert!((linear(64) - 0.051_269_46).abs() < 1e-7);
         assert!((linear(10) - 0.003_035_27).abs() < 1e-8);
         for bad in ["", "#", "ffffff", "#fffff", "#ggffff", "#fffffff", "#+1ffff", "#é1234"] {
             assert_eq!(hexadecimal(bad), None, "{bad}");

@@ -35,13 +35,11 @@ const RANKS: [(&str, Rank); 16] = [
 pub fn check(_: &Tree, crates: &[Member]) -> Vec<Problem> {
     let mut problems = Vec::new();
     for member in crates.iter().filter(|member| rank(member).is_none()) {
-        let what = "this crate has no rank: give it one in RANKS, xtask/src/tidy/arrows.rs, and in docs/ARCHITECTURE.md";
+        let what =
+            "this crate has no rank: give it one in RANKS, xtask/src/tidy/arrows.rs, and in docs/ARCHITECTURE.md";
         problems.push(Problem::of(&member.folder, what));
     }
-    let by_name: BTreeMap<_, _> = crates
-        .iter()
-        .map(|member| (member.name.as_str(), member))
-        .collect();
+    let by_name: BTreeMap<_, _> = crates.iter().map(|member| (member.name.as_str(), member)).collect();
     for member in crates {
         for arrow in &member.uses {
             let used = by_name.get(arrow.name.as_str()).copied();
@@ -49,71 +47,36 @@ pub fn check(_: &Tree, crates: &[Member]) -> Vec<Problem> {
                 continue;
             };
             let Some(to) = rank(used) else { continue };
-            let allowed = if arrow.dev_only {
-                to <= from
-            } else {
-                to < from
-            };
+            let allowed = if arrow.dev_only { to <= from } else { to < from };
             if !allowed {
-                let kind = if arrow.dev_only {
-                    "dev-dependency"
-                } else {
-                    "dependency"
-                };
-                let what = format!(
-                    "{kind} on {}, rank {} on rank {}: not below",
-                    used.folder,
-                    show(from),
-                    show(to)
-                );
+                let kind = if arrow.dev_only { "dev-dependency" } else { "dependency" };
+                let what = format!("{kind} on {}, rank {} on rank {}: not below", used.folder, show(from), show(to));
                 problems.push(Problem::of(&member.folder, what));
             }
         }
     }
     if let Some(circle) = circle(crates) {
-        problems.push(Problem::of(
-            "Cargo.toml",
-            format!("crates in a circle: {}", circle.join(", ")),
-        ));
+        problems.push(Problem::of("Cargo.toml", format!("crates in a circle: {}", circle.join(", "))));
     }
     problems
 }
 
 fn rank(member: &Member) -> Option<Rank> {
-    RANKS
-        .iter()
-        .find(|(folder, _)| *folder == member.folder)
-        .map(|(_, rank)| *rank)
+    RANKS.iter().find(|(folder, _)| *folder == member.folder).map(|(_, rank)| *rank)
 }
 
 fn show((rank, step): Rank) -> String {
-    if step == 0 {
-        rank.to_string()
-    } else {
-        format!("{rank}.{step}")
-    }
+    if step == 0 { rank.to_string() } else { format!("{rank}.{step}") }
 }
 
 /// The folders of a set of crates that use each other round and round, or of some that lead there; none without a circle.
 ///
 /// Crates that use nobody are taken away until none is left to take; what remains holds a circle.
 fn circle(crates: &[Member]) -> Option<Vec<&str>> {
-    let mut left: BTreeMap<&str, &Member> = crates
-        .iter()
-        .map(|member| (member.name.as_str(), member))
-        .collect();
+    let mut left: BTreeMap<&str, &Member> = crates.iter().map(|member| (member.name.as_str(), member)).collect();
     loop {
-        let is_free = |member: &Member| {
-            member
-                .uses
-                .iter()
-                .all(|arrow| !left.contains_key(arrow.name.as_str()))
-        };
-        let free: BTreeSet<_> = left
-            .values()
-            .filter(|member| is_free(member))
-            .map(|m| m.name.as_str())
-            .collect();
+        let is_free = |member: &Member| member.uses.iter().all(|arrow| !left.contains_key(arrow.name.as_str()));
+        let free: BTreeSet<_> = left.values().filter(|member| is_free(member)).map(|m| m.name.as_str()).collect();
         if free.is_empty() {
             break;
         }
@@ -133,47 +96,19 @@ mod tests {
 
     #[test]
     fn arrows_lead_down() {
+        check_house(&[member("core/geometry", &[]), member("core/scene", &["geometry"])], &[]);
+        check_house(&[member("nodes/runner", &[]), member("nodes/native", &["runner"])], &[]);
+        check_house(&[member("host", &[]), member("tests", &["host"]), member("xtask", &["host"])], &[]);
         check_house(
-            &[
-                member("core/geometry", &[]),
-                member("core/scene", &["geometry"]),
-            ],
-            &[],
-        );
-        check_house(
-            &[
-                member("nodes/runner", &[]),
-                member("nodes/native", &["runner"]),
-            ],
-            &[],
-        );
-        check_house(
-            &[
-                member("host", &[]),
-                member("tests", &["host"]),
-                member("xtask", &["host"]),
-            ],
-            &[],
-        );
-        check_house(
-            &[
-                member("core/geometry", &["scene"]),
-                member("core/scene", &[]),
-            ],
+            &[member("core/geometry", &["scene"]), member("core/scene", &[])],
             &["core/geometry: dependency on core/scene, rank 0 on rank 1: not below"],
         );
         check_house(
-            &[
-                member("core/wire", &["link"]),
-                member("transport/link", &[]),
-            ],
+            &[member("core/wire", &["link"]), member("transport/link", &[])],
             &["core/wire: dependency on transport/link, rank 1 on rank 1: not below"],
         );
         check_house(
-            &[
-                member("nodes/runner", &["native"]),
-                member("nodes/native", &[]),
-            ],
+            &[member("nodes/runner", &["native"]), member("nodes/native", &[])],
             &["nodes/runner: dependency on nodes/native, rank 7 on rank 7.1: not below"],
         );
         check_house(
@@ -184,18 +119,9 @@ mod tests {
 
     #[test]
     fn tests_of_a_crate_may_use_its_equals() {
+        check_house(&[member("core/wire", &["dev:scene"]), member("core/scene", &[])], &[]);
         check_house(
-            &[
-                member("core/wire", &["dev:scene"]),
-                member("core/scene", &[]),
-            ],
-            &[],
-        );
-        check_house(
-            &[
-                member("core/wire", &["dev:bintree"]),
-                member("core/bintree", &[]),
-            ],
+            &[member("core/wire", &["dev:bintree"]), member("core/bintree", &[])],
             &["core/wire: dev-dependency on core/bintree, rank 1 on rank 2: not below"],
         );
     }
@@ -203,25 +129,16 @@ mod tests {
     #[test]
     fn circles_are_refused() {
         check_house(
-            &[
-                member("core/wire", &["dev:scene"]),
-                member("core/scene", &["dev:wire"]),
-                member("core/arena", &[]),
-            ],
+            &[member("core/wire", &["dev:scene"]), member("core/scene", &["dev:wire"]), member("core/arena", &[])],
             &["Cargo.toml: crates in a circle: core/scene, core/wire"],
         );
-        check_house(
-            &[member("core/wire", &["dev:wire"])],
-            &["Cargo.toml: crates in a circle: core/wire"],
-        );
+        check_house(&[member("core/wire", &["dev:wire"])], &["Cargo.toml: crates in a circle: core/wire"]);
     }
 
     #[test]
     fn a_new_crate_needs_a_rank() {
-        let what = "this crate has no rank: give it one in RANKS, xtask/src/tidy/arrows.rs, and in docs/ARCHITECTURE.md";
-        check_house(
-            &[member("core/novel", &["geometry"])],
-            &[&format!("core/novel: {what}")],
-        );
+        let what =
+            "this crate has no rank: give it one in RANKS, xtask/src/tidy/arrows.rs, and in docs/ARCHITECTURE.md";
+        check_house(&[member("core/novel", &["geometry"])], &[&format!("core/novel: {what}")]);
     }
 }

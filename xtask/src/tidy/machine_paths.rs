@@ -8,36 +8,18 @@ const TOP_FOLDERS: [&str; 3] = ["work", "root", "home"];
 
 /// Refuses absolute paths below such a folder, in every text file.
 pub fn check(tree: &Tree, _: &[Member]) -> Vec<Problem> {
-    let lines = tree.texts().flat_map(|(path, text)| {
-        (1..)
-            .zip(text.lines())
-            .map(move |(at, line)| (path, at, line))
-    });
-    lines
-        .filter_map(|(path, at, line)| {
-            Some(Problem::at(
-                path,
-                at,
-                format!("machine path {}", find(line)?),
-            ))
-        })
-        .collect()
+    let lines = tree.texts().flat_map(|(path, text)| (1..).zip(text.lines()).map(move |(at, line)| (path, at, line)));
+    lines.filter_map(|(path, at, line)| Some(Problem::at(path, at, format!("machine path {}", find(line)?)))).collect()
 }
 
 fn find(line: &str) -> Option<String> {
     let paths = TOP_FOLDERS.iter().map(|folder| format!("/{folder}/"));
-    paths.into_iter().find(|path| {
-        line.match_indices(path.as_str())
-            .any(|(at, _)| begins_a_path(&line[..at]))
-    })
+    paths.into_iter().find(|path| line.match_indices(path.as_str()).any(|(at, _)| begins_a_path(&line[..at])))
 }
 
 /// A path after a name, as in a web address or below another folder, is not one from the top.
 fn begins_a_path(before: &str) -> bool {
-    !before
-        .chars()
-        .next_back()
-        .is_some_and(|c| c.is_alphanumeric() || "._-~/})]*".contains(c))
+    !before.chars().next_back().is_some_and(|c| c.is_alphanumeric() || "._-~/})]*".contains(c))
 }
 
 #[cfg(test)]
@@ -67,9 +49,6 @@ mod tests {
     fn the_place_is_named() {
         let text = "first\nsecond %home%x\n".replace('%', "/");
         let tree = Tree::of(&[("docs/a.md", &text)]);
-        assert_eq!(
-            lines(check(&tree, &[])),
-            ["docs/a.md:2: machine path %home%".replace('%', "/")]
-        );
+        assert_eq!(lines(check(&tree, &[])), ["docs/a.md:2: machine path %home%".replace('%', "/")]);
     }
 }

@@ -8,23 +8,13 @@ pub fn check(tree: &Tree, crates: &[Member]) -> Vec<Problem> {
     let mut problems = Vec::new();
     for member in crates {
         if member.description.trim().is_empty() {
-            problems.push(Problem::of(
-                &format!("{}/Cargo.toml", member.folder),
-                "no description",
-            ));
+            problems.push(Problem::of(&format!("{}/Cargo.toml", member.folder), "no description"));
         }
-        if member.folder.starts_with("core/") && !tree.has(&format!("{}/README.md", member.folder))
-        {
-            problems.push(Problem::of(
-                &member.folder,
-                "a core crate without README.md",
-            ));
+        if member.folder.starts_with("core/") && !tree.has(&format!("{}/README.md", member.folder)) {
+            problems.push(Problem::of(&member.folder, "a core crate without README.md"));
         }
         for root in &member.roots {
-            if tree
-                .text(root)
-                .is_some_and(|text| !opens_with_a_sentence(text))
-            {
+            if tree.text(root).is_some_and(|text| !opens_with_a_sentence(text)) {
                 problems.push(Problem::at(root, 1, "does not begin with a `//!` sentence"));
             }
         }
@@ -34,15 +24,9 @@ pub fn check(tree: &Tree, crates: &[Member]) -> Vec<Problem> {
 
 /// The paragraph of `//!` lines at the very top holds words and ends one.
 fn opens_with_a_sentence(text: &str) -> bool {
-    let comment = text
-        .lines()
-        .map_while(|line| line.strip_prefix("//!"))
-        .map(str::trim);
+    let comment = text.lines().map_while(|line| line.strip_prefix("//!")).map(str::trim);
     let paragraph: Vec<_> = comment.take_while(|line| !line.is_empty()).collect();
-    paragraph.join(" ").contains(' ')
-        && paragraph
-            .last()
-            .is_some_and(|line| line.ends_with(['.', ':', '?', '!']))
+    paragraph.join(" ").contains(' ') && paragraph.last().is_some_and(|line| line.ends_with(['.', ':', '?', '!']))
 }
 
 #[cfg(test)]
@@ -56,26 +40,12 @@ mod tests {
 
     #[test]
     fn crates_say_what_they_are() {
-        let files = [
-            ("core/wire/src/lib.rs", "//! Messages, byte by byte.\n"),
-            ("core/wire/README.md", ""),
-        ];
+        let files = [("core/wire/src/lib.rs", "//! Messages, byte by byte.\n"), ("core/wire/README.md", "")];
         check_crate(member("core/wire", &[]), &files, &[]);
-        let silent = Member {
-            description: " ".to_owned(),
-            ..member("core/wire", &[])
-        };
+        let silent = Member { description: " ".to_owned(), ..member("core/wire", &[]) };
         check_crate(silent, &files, &["core/wire/Cargo.toml: no description"]);
-        check_crate(
-            member("core/wire", &[]),
-            &files[..1],
-            &["core/wire: a core crate without README.md"],
-        );
-        check_crate(
-            member("host", &[]),
-            &[("host/src/lib.rs", "//! The parts of the program.\n")],
-            &[],
-        );
+        check_crate(member("core/wire", &[]), &files[..1], &["core/wire: a core crate without README.md"]);
+        check_crate(member("host", &[]), &[("host/src/lib.rs", "//! The parts of the program.\n")], &[]);
         check_crate(
             member("host", &[]),
             &[("host/src/lib.rs", "mod a;")],

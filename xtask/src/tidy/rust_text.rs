@@ -3,11 +3,7 @@
 /// The text with every character of a comment as a blank, and of a string or character literal as `_` (its quotes are
 /// kept). Lines stay where they are.
 pub fn mask(text: &str) -> String {
-    let mut rest = Masker {
-        text: text.chars().collect(),
-        at: 0,
-        out: String::with_capacity(text.len()),
-    };
+    let mut rest = Masker { text: text.chars().collect(), at: 0, out: String::with_capacity(text.len()) };
     while let Some(next) = rest.peek(0) {
         match next {
             '/' if rest.peek(1) == Some('/') => rest.line_comment(),
@@ -81,8 +77,7 @@ impl Masker {
     }
 
     fn hide(&mut self, mark: char) {
-        self.out
-            .extend(self.peek(0).map(|c| if c == '\n' { c } else { mark }));
+        self.out.extend(self.peek(0).map(|c| if c == '\n' { c } else { mark }));
         self.at += 1;
     }
 
@@ -186,14 +181,8 @@ mod tests {
         check("f(\"a\nb\")", "f(\"_\n_\")");
         check(r##"r#"un"safe"# z"##, r##"r#"_______"# z"##);
         check("br\"x\" b\"x\" c\"x\"", "br\"_\" b\"_\" c\"_\"");
-        check(
-            "'\"' + '\\'' + 'a' + '\\u{1f}' + b'/'",
-            "'_' + '__' + '_' + '______' + b'_'",
-        );
-        check(
-            "fn f<'a>(x: &'a str, y: &'static [u8])",
-            "fn f<'a>(x: &'a str, y: &'static [u8])",
-        );
+        check("'\"' + '\\'' + 'a' + '\\u{1f}' + b'/'", "'_' + '__' + '_' + '______' + b'_'");
+        check("fn f<'a>(x: &'a str, y: &'static [u8])", "fn f<'a>(x: &'a str, y: &'static [u8])");
         check("\"// no comment\" // yes", "\"_____________\"       ");
         check("barrier r crab\"x\"", "barrier r crab\"_\"");
         check("r#type", "r#type");
@@ -221,10 +210,7 @@ mod tests {
             "//! Promise.\n#![no_std]\n#![forbid( unsafe_code )]\n\nmod a;\n#![late]",
             &["#![no_std]", "#![forbid(unsafe_code)]"],
         );
-        check_head(
-            "#![cfg_attr(x,\n  doc = [1])] // why\nuse a;",
-            &["#![cfg_attr(x,doc=[1])]"],
-        );
+        check_head("#![cfg_attr(x,\n  doc = [1])] // why\nuse a;", &["#![cfg_attr(x,doc=[1])]"]);
         check_head("// #![no_std]\nfn main() {}", &[]);
         check_head("#![broken", &[]);
     }

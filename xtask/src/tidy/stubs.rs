@@ -13,9 +13,7 @@ pub fn check(tree: &Tree, _: &[Member]) -> Vec<Problem> {
     for (path, text) in tree.rust_sources() {
         for (at, code) in (1..).zip(mask(text).lines()) {
             let used = MACROS.iter().filter(|name| calls(code, name));
-            problems.extend(
-                used.map(|name| Problem::at(path, at, format!("{name}! left in the source"))),
-            );
+            problems.extend(used.map(|name| Problem::at(path, at, format!("{name}! left in the source"))));
         }
     }
     problems

@@ -43,9 +43,7 @@ impl Tree {
     #[cfg(test)]
     pub fn of(files: &[(&str, &str)]) -> Self {
         let text_of = |&(path, text): &(&str, &str)| (path.to_owned(), Some(text.to_owned()));
-        Self {
-            files: files.iter().map(text_of).collect(),
-        }
+        Self { files: files.iter().map(text_of).collect() }
     }
 
     /// The number of files.
@@ -55,9 +53,7 @@ impl Tree {
 
     /// The text files, in the order of their paths.
     pub fn texts(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.files
-            .iter()
-            .filter_map(|(path, text)| Some((path.as_str(), text.as_deref()?)))
+        self.files.iter().filter_map(|(path, text)| Some((path.as_str(), text.as_deref()?)))
     }
 
     /// The Rust files.
@@ -77,49 +73,25 @@ impl Tree {
 
     /// Whether there is such a file, or a folder that holds one.
     pub fn has(&self, path: &str) -> bool {
-        let folder = if path.is_empty() {
-            String::new()
-        } else {
-            format!("{path}/")
-        };
+        let folder = if path.is_empty() { String::new() } else { format!("{path}/") };
         self.files.contains_key(path)
-            || self
-                .files
-                .range(folder.clone()..)
-                .next()
-                .is_some_and(|(file, _)| file.starts_with(&folder))
+            || self.files.range(folder.clone()..).next().is_some_and(|(file, _)| file.starts_with(&folder))
     }
 }
 
 /// A zero byte near the beginning marks what is not text; so does what is not UTF-8.
 fn text(bytes: Vec<u8>) -> Option<String> {
     let is_binary = bytes.iter().take(8192).any(|&byte| byte == 0);
-    if is_binary {
-        None
-    } else {
-        String::from_utf8(bytes).ok()
-    }
+    if is_binary { None } else { String::from_utf8(bytes).ok() }
 }
 
 /// What git lists below the root, unless there is no git, no repository, or it refuses (a clone of another user's).
 fn git_files(root: &Path) -> Option<Vec<String>> {
     let mut git = Command::new("git");
-    git.args([
-        "ls-files",
-        "-z",
-        "--cached",
-        "--others",
-        "--exclude-standard",
-    ])
-    .current_dir(root)
-    .stdin(Stdio::null());
+    git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).current_dir(root).stdin(Stdio::null());
     let answer = git.output().ok().filter(|answer| answer.status.success())?;
     let list = String::from_utf8_lossy(&answer.stdout).into_owned();
-    let names: Vec<_> = list
-        .split('\0')
-        .filter(|name| !name.is_empty())
-        .map(str::to_owned)
-        .collect();
+    let names: Vec<_> = list.split('\0').filter(|name| !name.is_empty()).map(str::to_owned).collect();
     // An archive unpacked inside somebody else's repository that ignores it.
     (!names.is_empty()).then_some(names)
 }
@@ -128,9 +100,7 @@ fn walk(root: &Path) -> anyhow::Result<Vec<String>> {
     let mut names = Vec::new();
     let mut folders: Vec<PathBuf> = vec![root.to_owned()];
     while let Some(folder) = folders.pop() {
-        for entry in
-            fs::read_dir(&folder).with_context(|| format!("listing {}", folder.display()))?
-        {
+        for entry in fs::read_dir(&folder).with_context(|| format!("listing {}", folder.display()))? {
             let entry = entry?;
             let kind = entry.file_type()?;
             if kind.is_dir() && !NOT_OURS.iter().any(|name| entry.file_name() == *name) {
@@ -170,27 +140,13 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let this = "src/tidy/tree.rs";
         assert!(walk(root).unwrap().iter().any(|name| name == this));
-        assert!(
-            Tree::read(root)
-                .unwrap()
-                .text(this)
-                .is_some_and(|text| text.contains("git_and_the_walk"))
-        );
+        assert!(Tree::read(root).unwrap().text(this).is_some_and(|text| text.contains("git_and_the_walk")));
     }
 
     #[test]
     fn sources_are_below_src() {
-        let tree = Tree::of(&[
-            ("a/src/lib.rs", ""),
-            ("a/tests/t.rs", ""),
-            ("a/src/note.md", ""),
-        ]);
-        assert_eq!(
-            tree.rust_sources()
-                .map(|(path, _)| path)
-                .collect::<Vec<_>>(),
-            ["a/src/lib.rs"]
-        );
+        let tree = Tree::of(&[("a/src/lib.rs", ""), ("a/tests/t.rs", ""), ("a/src/note.md", "")]);
+        assert_eq!(tree.rust_sources().map(|(path, _)| path).collect::<Vec<_>>(), ["a/src/lib.rs"]);
         assert_eq!(tree.rust().count(), 2);
     }
 }

@@ -13,14 +13,11 @@ pub fn check(tree: &Tree, _: &[Member]) -> Vec<Problem> {
     };
     let source = tree.rust().filter(|(path, _)| path.starts_with(SOURCE));
     let hash = format!("{:016x}", fnv1a(source.flat_map(|(_, text)| text.bytes())));
-    let mut pins = (1..)
-        .zip(page.lines())
-        .filter_map(|(at, line)| Some((at, line.trim().strip_prefix("source: ")?)));
+    let mut pins = (1..).zip(page.lines()).filter_map(|(at, line)| Some((at, line.trim().strip_prefix("source: ")?)));
     match pins.next() {
         Some((_, pin)) if pin == hash => Vec::new(),
         Some((at, _)) => {
-            let what =
-                format!("the source is now {hash}: read {PAGE} again, and bring it up to date");
+            let what = format!("the source is now {hash}: read {PAGE} again, and bring it up to date");
             vec![Problem::at(PAGE, at, what)]
         }
         None => vec![Problem::of(PAGE, format!("has no line `source: {hash}`"))],
@@ -30,9 +27,7 @@ pub fn check(tree: &Tree, _: &[Member]) -> Vec<Problem> {
 /// Fowler, Noll and Vo's hash 1a of 64 bits. Carriage returns are left out, since a checkout may add them.
 fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
     let bytes = bytes.filter(|&byte| byte != b'\r');
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 #[cfg(test)]
@@ -51,11 +46,7 @@ mod tests {
 
     fn check_page(page: &str, expected: &[&str]) {
         // "foobar", cut in two files; what stands elsewhere does not count.
-        let source = [
-            ("core/wire/src/b.rs", "bar"),
-            ("core/wire/src/a.rs", "foo"),
-            ("core/wire/tests/t.rs", "x"),
-        ];
+        let source = [("core/wire/src/b.rs", "bar"), ("core/wire/src/a.rs", "foo"), ("core/wire/tests/t.rs", "x")];
         let tree = Tree::of(&[&source[..], &[("docs/WIRE.md", page)]].concat());
         assert_eq!(lines(check(&tree, &[])), expected);
     }
@@ -63,20 +54,10 @@ mod tests {
     #[test]
     fn the_page_follows_the_source() {
         check_page("# Wire\n\nsource: 85944171f73967e8\n", &[]);
-        let again =
-            "the source is now 85944171f73967e8: read docs/WIRE.md again, and bring it up to date";
-        check_page(
-            "# Wire\n\nsource: 85944171f73967e9\n",
-            &[&format!("docs/WIRE.md:3: {again}")],
-        );
-        check_page(
-            "source: \n",
-            &["docs/WIRE.md: has no line `source: 85944171f73967e8`"],
-        );
-        check_page(
-            "# Wire\n",
-            &["docs/WIRE.md: has no line `source: 85944171f73967e8`"],
-        );
+        let again = "the source is now 85944171f73967e8: read docs/WIRE.md again, and bring it up to date";
+        check_page("# Wire\n\nsource: 85944171f73967e9\n", &[&format!("docs/WIRE.md:3: {again}")]);
+        check_page("source: \n", &["docs/WIRE.md: has no line `source: 85944171f73967e8`"]);
+        check_page("# Wire\n", &["docs/WIRE.md: has no line `source: 85944171f73967e8`"]);
         assert!(check(&Tree::of(&[("core/wire/src/a.rs", "foo")]), &[]).is_empty());
     }
 }

@@ -57,11 +57,7 @@ fn every_implementation_gives_the_portable_bits() {
         for j in 0..16 {
             let a = core::array::from_fn(|k| AWKWARD[(i + k) % 16]);
             let b = core::array::from_fn(|k| AWKWARD[(j + 3 * k) % 16]);
-            assert_eq!(
-                Kernels::detect().run(Everything(a, b)),
-                Kernels::Portable.run(Everything(a, b)),
-                "{a:?} {b:?}"
-            );
+            assert_eq!(Kernels::detect().run(Everything(a, b)), Kernels::Portable.run(Everything(a, b)), "{a:?} {b:?}");
         }
     }
 }

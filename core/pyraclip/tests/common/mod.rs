@@ -59,7 +59,7 @@ pub fn scattered(seed: u64, count: usize) -> Vec<Object> {
     let mut r = Random(seed);
     let object = |i: usize| {
         let centre = r.point(0.95);
-        if i % 2 == 0 {
+        if i.is_multiple_of(2) {
             Object::Sphere(Sphere { centre, radius: r.within(0.002, 0.04) })
         } else {
             Object::Triangle(Triangle { v: [0; 3].map(|_| centre + r.point(0.05)) })
@@ -72,7 +72,7 @@ pub fn scattered(seed: u64, count: usize) -> Vec<Object> {
 pub fn on_the_grid(seed: u64, count: usize) -> Vec<Object> {
     let mut r = Random(seed);
     let object = |i: usize| {
-        if i % 4 == 0 {
+        if i.is_multiple_of(4) {
             Object::Sphere(Sphere { centre: r.grid_point(0.75), radius: 0.125 })
         } else {
             let mut v = [0; 3].map(|_| r.grid_point(1.0));
@@ -178,16 +178,16 @@ pub fn trees() -> Vec<(&'static str, Tree)> {
         ("scattered", Tree::new(scattered(1, 1500), cube(1.0), 24, midpoint)),
         ("scattered, inexact midpoints", Tree::new(scattered(2, 1500), crooked(), 18, midpoint)),
         ("scattered, cut at a third", Tree::new(scattered(3, 700), crooked(), 18, |lo, hi| lo + (hi - lo) * 0.35)),
-        ("on the grid", Tree::new(on_the_grid(4, 300), cube(1.0), 18, midpoint)),
-        ("deep", Tree::new(scattered(5, 40).into_iter().chain(cluster(6)).collect(), crooked(), 48, midpoint)),
+        ("on the grid", Tree::new(on_the_grid(4, 200), cube(1.0), 12, midpoint)),
+        ("deep", Tree::new(scattered(5, 40).into_iter().chain(cluster(6)).collect(), crooked(), 54, midpoint)),
     ]
 }
 
 /// Tiny spheres in one place, for cells not much larger than the error of their coordinates.
 fn cluster(seed: u64) -> Vec<Object> {
     let mut r = Random(seed);
-    let sphere = |_| Object::Sphere(Sphere { centre: Vec3::new(0.3, -0.2, 0.6) + r.point(5e-5), radius: 1e-6 });
-    (0..200).map(sphere).collect()
+    let sphere = |_| Object::Sphere(Sphere { centre: Vec3::new(0.3, -0.2, 0.6) + r.point(1e-4), radius: 4e-6 });
+    (0..600).map(sphere).collect()
 }
 
 pub struct Camera {
@@ -227,7 +227,7 @@ pub fn cameras() -> Vec<Camera> {
         Camera::new([-2.1, 1.7, 1.3], [0.8, -0.63, -0.5], [0.2, 0.1, 0.2], [-0.1, 0.22, -0.3]),
         Camera::new([0.31, -0.12, 0.577], [-0.1, 0.7, 0.3], [0.6, 0.1, 0.0], [0.0, -0.2, 0.5]),
         Camera::new([7.3, 0.01, 0.02], [-1.0, 0.0, 0.003], [0.0, 0.1, 0.02], [0.004, 0.03, -0.15]),
-        Camera::new([0.302, -0.198, 0.595], [-0.002, -0.002, 0.005], [0.001, 0.0, 0.0], [0.0, 0.001, 0.0]),
+        Camera::new([0.3004, -0.1996, 0.599], [-0.0004, -0.0004, 0.001], [0.0002, 0.0, 0.0], [0.0, 0.0002, 0.0]),
     ]
 }
 

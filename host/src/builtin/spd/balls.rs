@@ -9,13 +9,8 @@ use core::f64::consts::PI;
 /// Radius of a child, its parent's being 1.
 const RATIO: f64 = 1.0 / 3.0;
 
-const VIEW: View = View {
-    eye: [2.1, 1.3, 1.7],
-    target: [0.0; 3],
-    up: [0.0, 0.0, 1.0],
-    fov_degrees: 45.0,
-    hither: 0.01,
-};
+const VIEW: View =
+    View { eye: [2.1, 1.3, 1.7], target: [0.0; 3], up: [0.0, 0.0, 1.0], fov_degrees: 45.0, hither: 0.01 };
 
 const LIGHTS: [V; 3] = [[4.0, 3.0, 2.0], [1.0, -4.0, 4.0], [-3.0, 1.0, 5.0]];
 
@@ -23,18 +18,8 @@ const LIGHTS: [V; 3] = [[4.0, 3.0, 2.0], [1.0, -4.0, 4.0], [-3.0, 1.0, 5.0]];
 pub fn balls(size: u32) -> Model {
     let mut model = scene(&VIEW, &LIGHTS);
     let corner = |x: f64, y: f64| [x, y, -0.5];
-    let square = [
-        corner(12.0, 12.0),
-        corner(-12.0, 12.0),
-        corner(-12.0, -12.0),
-        corner(12.0, -12.0),
-    ];
-    add_quad(
-        &mut model,
-        "floor",
-        square,
-        surface([1.0, 0.75, 0.33], 0.8, 0.0, 0.0, 0.0, 1.0),
-    );
+    let square = [corner(12.0, 12.0), corner(-12.0, 12.0), corner(-12.0, -12.0), corner(12.0, -12.0)];
+    add_quad(&mut model, "floor", square, surface([1.0, 0.75, 0.33], 0.8, 0.0, 0.0, 0.0, 1.0));
     flake(&mut model, size);
     model
 }
@@ -51,18 +36,9 @@ fn flake(model: &mut Model, size: u32) {
     model.spheres.reserve_exact((9_usize.pow(size + 1) - 1) / 8);
     let petals = petals();
     // Depth first, parents before children. The stack holds at most eight waiting siblings for each level.
-    let mut waiting = vec![Ball {
-        centre: [0.0; 3],
-        radius: 0.5,
-        outward: Z,
-        levels: size,
-    }];
+    let mut waiting = vec![Ball { centre: [0.0; 3], radius: 0.5, outward: Z, levels: size }];
     while let Some(ball) = waiting.pop() {
-        model.spheres.push(Sphere {
-            centre: narrow(ball.centre),
-            radius: ball.radius as f32,
-            material,
-        });
+        model.spheres.push(Sphere { centre: narrow(ball.centre), radius: ball.radius as f32, material });
         if ball.levels > 0 {
             let turn = from_z_to(ball.outward);
             let child = |petal: &V| ball.child(turn.apply(*petal));
@@ -86,12 +62,7 @@ impl Ball {
         let distance = self.radius * (1.0 + RATIO);
         let centre = add(self.centre, scale(direction, distance));
         let outward = scale(sub(centre, self.centre), 1.0 / distance);
-        Self {
-            centre,
-            radius: self.radius * RATIO,
-            outward,
-            levels: self.levels - 1,
-        }
+        Self { centre, radius: self.radius * RATIO, outward, levels: self.levels - 1 }
     }
 }
 
@@ -104,11 +75,7 @@ fn from_z_to(outward: V) -> Affine {
     } else if cosine <= -0.9999 {
         Affine::turn(Y, -1.0, 0.0)
     } else {
-        Affine::turn(
-            unit(cross(Z, outward)),
-            cosine,
-            (1.0 - cosine * cosine).sqrt(),
-        )
+        Affine::turn(unit(cross(Z, outward)), cosine, (1.0 - cosine * cosine).sqrt())
     }
 }
 

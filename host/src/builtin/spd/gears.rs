@@ -14,39 +14,19 @@ const OUTER: f64 = 0.995;
 /// And the gaps between them down to here.
 const INNER: f64 = 0.9;
 
-const VIEW: View = View {
-    eye: [-1.1, -2.1, 2.6],
-    target: [0.0; 3],
-    up: [0.0, 0.0, 1.0],
-    fov_degrees: 45.0,
-    hither: 1.0,
-};
+const VIEW: View =
+    View { eye: [-1.1, -2.1, 2.6], target: [0.0; 3], up: [0.0, 0.0, 1.0], fov_degrees: 45.0, hither: 1.0 };
 
 /// The last one is just behind the eye.
-const LIGHTS: [V; 5] = [
-    [2.0, 4.0, 4.0],
-    [-2.0, 4.0, 3.0],
-    [2.0, -2.5, 2.5],
-    [-1.0, -4.0, 2.0],
-    [-1.111, -2.121, 2.626],
-];
+const LIGHTS: [V; 5] =
+    [[2.0, 4.0, 4.0], [-2.0, 4.0, 3.0], [2.0, -2.5, 2.5], [-1.0, -4.0, 2.0], [-1.111, -2.121, 2.626]];
 
 /// `size` gears along each side of the cube, 146 polygons each.
 pub fn gears(size: u32) -> Model {
     let mut model = scene(&VIEW, &LIGHTS);
     let corner = |x: f64, y: f64| [x, y, 0.0];
-    let square = [
-        corner(2.0, 2.0),
-        corner(-2.0, 2.0),
-        corner(-2.0, -2.0),
-        corner(2.0, -2.0),
-    ];
-    add_quad(
-        &mut model,
-        "ground",
-        square,
-        surface([1.0, 0.85, 0.7], 0.3, 0.6, 37.0, 0.0, 0.0),
-    );
+    let square = [corner(2.0, 2.0), corner(-2.0, 2.0), corner(-2.0, -2.0), corner(2.0, -2.0)];
+    add_quad(&mut model, "ground", square, surface([1.0, 0.85, 0.7], 0.3, 0.6, 37.0, 0.0, 0.0));
 
     let n = f64::from(size);
     let radius = 1.0 / (n - (n - 1.0) * (1.0 - INNER) / 2.0);
@@ -60,9 +40,7 @@ pub fn gears(size: u32) -> Model {
         for iy in 0..size {
             for ix in 0..size {
                 let colour = Colour::of(ix, iy, iz);
-                let mesh = *meshes
-                    .entry(colour)
-                    .or_insert_with(|| colour.add_mesh(&mut model));
+                let mesh = *meshes.entry(colour).or_insert_with(|| colour.add_mesh(&mut model));
                 let place = |i: u32| f64::from(i) * pitch - 1.0 + radius;
                 let centre = [place(ix), place(iy), 1.0 - f64::from(iz) / n];
                 let outline = &outlines[((ix + iy + iz) % 2) as usize];
@@ -83,15 +61,9 @@ struct Colour {
 
 impl Colour {
     fn of(x: u32, y: u32, z: u32) -> Self {
-        let sevenths = [
-            (x * 3 + y * 2 + z + 1) * 5 % 7,
-            (y * 3 + z * 2 + x + 1) * 3 % 7,
-            (z * 3 + x * 2 + y + 1) * 2 % 7,
-        ];
-        Self {
-            sevenths,
-            clear: (x * 4 + y * 2 + z).is_multiple_of(5),
-        }
+        let sevenths =
+            [(x * 3 + y * 2 + z + 1) * 5 % 7, (y * 3 + z * 2 + x + 1) * 3 % 7, (z * 3 + x * 2 + y + 1) * 2 % 7];
+        Self { sevenths, clear: (x * 4 + y * 2 + z).is_multiple_of(5) }
     }
 
     /// Adds an empty mesh of this colour; returns its place.
@@ -99,19 +71,12 @@ impl Colour {
         let rgb = self.sevenths.map(|s| 0.01 + f64::from(s) / 7.0);
         let most = rgb.into_iter().fold(0.0, f64::max);
         let rgb = rgb.map(|c| c / most);
-        let material = if self.clear {
-            surface(rgb, 0.2, 0.0, 0.0, 0.8, 1.1)
-        } else {
-            surface(rgb, 1.0, 0.0, 0.0, 0.0, 0.0)
-        };
+        let material =
+            if self.clear { surface(rgb, 0.2, 0.0, 0.0, 0.8, 1.1) } else { surface(rgb, 1.0, 0.0, 0.0, 0.0, 0.0) };
         let [r, g, b] = self.sevenths;
         let name = format!("gear-{r}{g}{b}{}", if self.clear { "-clear" } else { "" });
         let material = model.add_material(&name, material);
-        model.meshes.push(Mesh {
-            name,
-            material,
-            ..Mesh::default()
-        });
+        model.meshes.push(Mesh { name, material, ..Mesh::default() });
         model.meshes.len() - 1
     }
 }
@@ -135,11 +100,7 @@ fn triangulate(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
     let counterclockwise = |t: &[u32]| {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| outline[i as usize]);
         let left = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0;
-        if left {
-            [t[0], t[1], t[2]]
-        } else {
-            [t[0], t[2], t[1]]
-        }
+        if left { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] }
     };
     indices.chunks_exact(3).map(counterclockwise).collect()
 }
@@ -150,18 +111,10 @@ fn add_gear(mesh: &mut Mesh, outline: &[[f64; 2]], face: &[[u32; 3]], centre: V,
     let rim = outline.len() as u32;
     let bottom = top + rim;
     for z in [centre[2], centre[2] - thickness] {
-        mesh.positions.extend(
-            outline
-                .iter()
-                .map(|p| narrow([centre[0] + p[0], centre[1] + p[1], z])),
-        );
+        mesh.positions.extend(outline.iter().map(|p| narrow([centre[0] + p[0], centre[1] + p[1], z])));
     }
-    mesh.triangles
-        .extend(face.iter().map(|t| t.map(|i| top + i)));
-    mesh.triangles.extend(
-        face.iter()
-            .map(|&[a, b, c]| [bottom + a, bottom + c, bottom + b]),
-    );
+    mesh.triangles.extend(face.iter().map(|t| t.map(|i| top + i)));
+    mesh.triangles.extend(face.iter().map(|&[a, b, c]| [bottom + a, bottom + c, bottom + b]));
     for i in 0..rim {
         let next = (i + 1) % rim;
         mesh.triangles.push([top + i, bottom + i, bottom + next]);
@@ -199,33 +152,16 @@ mod tests {
             assert_eq!(checks::open_edges(mesh), 0, "{}", mesh.name);
             assert!(checks::volume(mesh) > 0.0, "{}", mesh.name);
         }
-        assert_eq!(
-            model.meshes[1..]
-                .iter()
-                .map(|m| m.triangles.len())
-                .sum::<usize>(),
-            27 * (2 * 142 + 2 * 144)
-        );
+        assert_eq!(model.meshes[1..].iter().map(|m| m.triangles.len()).sum::<usize>(), 27 * (2 * 142 + 2 * 144));
     }
 
     /// A gear in five or so lets light through: of 64, those with 4 x + 2 y + z divisible by 5.
     #[test]
     fn some_gears_are_clear() {
         let model = gears(4);
-        let clear = |m: &&Mesh| {
-            model.materials[usize::from(m.material)]
-                .material
-                .transmits()
-        };
-        let triangles: usize = model
-            .meshes
-            .iter()
-            .filter(clear)
-            .map(|m| m.triangles.len())
-            .sum();
-        let expected = (0..64)
-            .filter(|i| ((i % 4) * 4 + (i / 4 % 4) * 2 + i / 16) % 5 == 0)
-            .count();
+        let clear = |m: &&Mesh| model.materials[usize::from(m.material)].material.transmits();
+        let triangles: usize = model.meshes.iter().filter(clear).map(|m| m.triangles.len()).sum();
+        let expected = (0..64).filter(|i| ((i % 4) * 4 + (i / 4 % 4) * 2 + i / 16) % 5 == 0).count();
         assert_eq!(triangles, expected * (2 * 142 + 2 * 144));
     }
 }

@@ -4,14 +4,8 @@ use super::super::vector::{V, add, narrow, scale};
 use super::{View, scene, surface};
 use crate::model::{Cone, Model, Sphere};
 
-const LIGHTS: [V; 6] = [
-    [2.0, 0.5, 0.5],
-    [-1.0, 0.5, 0.5],
-    [0.5, 2.0, 0.5],
-    [0.5, -1.0, 0.5],
-    [0.5, 0.5, 2.0],
-    [0.5, 0.5, -1.0],
-];
+const LIGHTS: [V; 6] =
+    [[2.0, 0.5, 0.5], [-1.0, 0.5, 0.5], [0.5, 2.0, 0.5], [0.5, -1.0, 0.5], [0.5, 0.5, 2.0], [0.5, 0.5, -1.0]];
 
 /// (size + 1)^3 spheres and 3 size (size + 1)^2 cylinders in the unit cube.
 pub fn lattice(size: u32) -> Model {
@@ -29,11 +23,7 @@ pub fn lattice(size: u32) -> Model {
     let mut model = scene(&view, &LIGHTS);
     let ball = model.add_material("ball", surface([0.9; 3], 0.5, 0.5, 37.0, 0.0, 0.0));
     let mut rod = |name, rgb| model.add_material(name, surface(rgb, 0.99, 0.0, 0.0, 0.0, 0.0));
-    let rods = [
-        rod("x-rod", [0.9, 0.1, 0.1]),
-        rod("y-rod", [0.1, 0.9, 0.1]),
-        rod("z-rod", [0.1, 0.1, 0.9]),
-    ];
+    let rods = [rod("x-rod", [0.9, 0.1, 0.1]), rod("y-rod", [0.1, 0.9, 0.1]), rod("z-rod", [0.1, 0.1, 0.9])];
 
     let (ball_radius, rod_radius) = (0.25 / n, 0.0625 / n);
     // Rods end a little within the balls (the root of the radii's ratio is the published way to say so).
@@ -42,11 +32,7 @@ pub fn lattice(size: u32) -> Model {
         for y in 0..=size {
             for z in 0..=size {
                 let corner = [x, y, z].map(|i| f64::from(i) / n);
-                model.spheres.push(Sphere {
-                    centre: narrow(corner),
-                    radius: ball_radius as f32,
-                    material: ball,
-                });
+                model.spheres.push(Sphere { centre: narrow(corner), radius: ball_radius as f32, material: ball });
                 for axis in 0..3 {
                     if [x, y, z][axis] == size {
                         continue;

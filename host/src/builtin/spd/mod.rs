@@ -69,10 +69,7 @@ fn scene(view: &View, lights: &[V]) -> Model {
         cameras: vec![camera],
         background: SKY,
         // Testing procedure 7 of the package: rays to depth 5, the eye's being of depth 1.
-        settings: Settings {
-            depth: Some(5),
-            ..Settings::default()
-        },
+        settings: Settings { depth: Some(5), ..Settings::default() },
         ..Model::default()
     }
 }
@@ -101,10 +98,7 @@ fn add_quad(model: &mut Model, name: &str, corners: [V; 4], material: Material) 
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material,
     });
-    model.objects = Objects {
-        polygons: model.objects.polygons + 1,
-        ..model.objects
-    };
+    model.objects = Objects { polygons: model.objects.polygons + 1, ..model.objects };
 }
 
 #[cfg(test)]
@@ -113,33 +107,18 @@ mod tests {
     use crate::builtin::{builtin, checks};
 
     fn make(name: &str) -> Model {
-        builtin(name)
-            .expect("a built-in name")
-            .expect("a size in range")
+        builtin(name).expect("a built-in name").expect("a size in range")
     }
 
     /// Polygons, spheres, cones and cylinders.
     #[track_caller]
     fn check(name: &str, polygons: u64, spheres: u64, cones: u64, cylinders: u64) {
         let model = make(name);
-        assert_eq!(
-            model.objects,
-            Objects {
-                polygons,
-                spheres,
-                cones,
-                cylinders
-            },
-            "{name}"
-        );
+        assert_eq!(model.objects, Objects { polygons, spheres, cones, cylinders }, "{name}");
         checks::sound(&model);
         assert_eq!(model.spheres.len() as u64, spheres);
         assert_eq!(model.cones.len() as u64, cones + cylinders);
-        let unequal = model
-            .cones
-            .iter()
-            .filter(|c| c.base_radius != c.apex_radius)
-            .count();
+        let unequal = model.cones.iter().filter(|c| c.base_radius != c.apex_radius).count();
         assert_eq!(unequal as u64, cones);
     }
 
@@ -198,11 +177,7 @@ mod tests {
         ] {
             let model = make(name);
             let o = model.objects;
-            assert_eq!(
-                o.polygons + o.spheres + o.cones + o.cylinders,
-                primitives,
-                "{name}"
-            );
+            assert_eq!(o.polygons + o.spheres + o.cones + o.cylinders, primitives, "{name}");
             assert_eq!(model.lights.len(), lights, "{name}");
             let total: f32 = model.lights.iter().map(|l| l.colour[0] * l.colour[0]).sum();
             assert!((total - 1.0).abs() < 1e-5, "{name}: {total}");

@@ -12,28 +12,16 @@ use core::f64::consts::{PI, SQRT_2};
 const FRACTAL_DIMENSION: f64 = 2.2;
 const MOUNTAIN: u32 = 21;
 
-const VIEW: View = View {
-    eye: [-1.6, 1.6, 1.7],
-    target: [0.0; 3],
-    up: [0.0, 0.0, 1.0],
-    fov_degrees: 45.0,
-    hither: 0.01,
-};
+const VIEW: View =
+    View { eye: [-1.6, 1.6, 1.7], target: [0.0; 3], up: [0.0, 0.0, 1.0], fov_degrees: 45.0, hither: 0.01 };
 
 /// 2 x 4^size triangles and four spheres.
 pub fn mount(size: u32) -> Model {
     let mut model = scene(&VIEW, &[[-100.0, -100.0, 100.0]]);
     let glass = model.add_material("glass", surface([1.0; 3], 0.1, 0.1, 6.7, 0.9, 1.5));
     model.spheres.extend(pyramid([-0.8, 0.8, 1.0], 0.17, glass));
-    let material = model.add_material(
-        "mountain",
-        surface([0.5, 0.45, 0.35], 1.0, 0.0, 0.0, 0.0, 0.0),
-    );
-    let mesh = Mesh {
-        name: "mountain".to_owned(),
-        material,
-        ..mountain(size)
-    };
+    let material = model.add_material("mountain", surface([0.5, 0.45, 0.35], 1.0, 0.0, 0.0, 0.0, 0.0));
+    let mesh = Mesh { name: "mountain".to_owned(), material, ..mountain(size) };
     model.objects.polygons = mesh.triangles.len() as u64;
     model.objects.spheres = model.spheres.len() as u64;
     model.meshes.push(mesh);
@@ -47,16 +35,8 @@ fn pyramid(centre: V, radius: f64, material: u16) -> [Sphere; 4] {
     let tip = Affine::turn(unit([1.0, 1.0, 0.0]), -1.0 / 3.0, 8.0_f64.sqrt() / 3.0);
     let low = tip.apply(top);
     core::array::from_fn(|i| {
-        let offset = if i == 0 {
-            top
-        } else {
-            Affine::turn_by(Z, (i - 1) as f64 * 2.0 * PI / 3.0).apply(low)
-        };
-        Sphere {
-            centre: narrow(add(centre, offset)),
-            radius: radius as f32,
-            material,
-        }
+        let offset = if i == 0 { top } else { Affine::turn_by(Z, (i - 1) as f64 * 2.0 * PI / 3.0).apply(low) };
+        Sphere { centre: narrow(add(centre, offset)), radius: radius as f32, material }
     })
 }
 
@@ -75,11 +55,7 @@ fn mountain(size: u32) -> Mesh {
             triangles.push([high + 1, high, low]);
         }
     }
-    Mesh {
-        positions,
-        triangles,
-        ..Mesh::default()
-    }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 /// Heights of the grid's points, row by row. The published program recurses over squares; going level by level over
@@ -115,15 +91,8 @@ fn heights(size: u32) -> Vec<f64> {
 /// The published hash, 16 bits. It shifts so that a point has the same hash at every size; its last shift is to the
 /// left by `7 - size`, which is a shift to the right above size 7 (where the published program is not defined).
 fn hash(x: u32, y: u32, size: u32) -> u32 {
-    let last = if size <= 7 {
-        x << (7 - size)
-    } else {
-        x >> (size - 7)
-    };
-    (x << (23 - size))
-        .wrapping_add(y << (15 - size))
-        .wrapping_add(last)
-        & 0xFFFF
+    let last = if size <= 7 { x << (7 - size) } else { x >> (size - 7) };
+    (x << (23 - size)).wrapping_add(y << (15 - size)).wrapping_add(last) & 0xFFFF
 }
 
 /// A normally distributed number from a seed below 134,456, by the polar method over a small linear congruential
@@ -165,20 +134,9 @@ mod tests {
     }
 
     /// The published program's recursion, written as it is described, over `f64` corners.
-    fn recurse(
-        size: u32,
-        width: usize,
-        at: (usize, usize),
-        c: [f64; 4],
-        out: &mut Vec<((usize, usize), f64)>,
-    ) {
+    fn recurse(size: u32, width: usize, at: (usize, usize), c: [f64; 4], out: &mut Vec<((usize, usize), f64)>) {
         let (x, y) = at;
-        out.extend([
-            ((x, y), c[0]),
-            ((x + width, y), c[1]),
-            ((x + width, y + width), c[2]),
-            ((x, y + width), c[3]),
-        ]);
+        out.extend([((x, y), c[0]), ((x + width, y), c[1]), ((x + width, y + width), c[2]), ((x, y + width), c[3])]);
         if width == 1 {
             return;
         }
@@ -224,10 +182,7 @@ mod tests {
         let values: Vec<f64> = (0..65_536).map(gauss).collect();
         let mean = values.iter().sum::<f64>() / 65_536.0;
         let variance = values.iter().map(|v| v * v).sum::<f64>() / 65_536.0;
-        assert!(
-            mean.abs() < 0.02 && (variance - 1.0).abs() < 0.03,
-            "{mean} {variance}"
-        );
+        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.03, "{mean} {variance}");
     }
 
     #[test]

@@ -15,37 +15,14 @@ pub fn rings(size: u32) -> Model {
     let spread = 1.0 / libm::sin(PI / 8.0);
     let eye = [-1.0, -spread, 0.5];
     let target = add(eye, [0.0, 1.0, 0.0]);
-    let view = View {
-        eye,
-        target,
-        up: Z,
-        fov_degrees: 45.0,
-        hither: 1.0,
-    };
-    let mut model = scene(
-        &view,
-        &[
-            [3.0, -spread, 3.0],
-            [-4.0, -spread, 1.0],
-            [2.0, -spread, -4.0],
-        ],
-    );
+    let view = View { eye, target, up: Z, fov_degrees: 45.0, hither: 1.0 };
+    let mut model = scene(&view, &[[3.0, -spread, 3.0], [-4.0, -spread, 1.0], [2.0, -spread, -4.0]]);
 
     let depth = spread * f64::from(size + 1);
     let reach = 1.01 * (depth - eye[1]) * libm::tan(PI / 8.0);
     let corner = |x: f64, z: f64| [eye[0] + x * reach, depth, eye[2] + z * reach];
-    let wall = [
-        corner(1.0, 1.0),
-        corner(-1.0, 1.0),
-        corner(-1.0, -1.0),
-        corner(1.0, -1.0),
-    ];
-    add_quad(
-        &mut model,
-        "wall",
-        wall,
-        surface([1.0; 3], 1.0, 0.0, 0.0, 0.0, 0.0),
-    );
+    let wall = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+    add_quad(&mut model, "wall", wall, surface([1.0; 3], 1.0, 0.0, 0.0, 0.0, 0.0));
 
     let mut ring = |name, rgb| model.add_material(name, surface(rgb, 0.5, 0.2, 37.0, 0.0, 0.0));
     let materials = [
@@ -68,18 +45,8 @@ pub fn rings(size: u32) -> Model {
                         let before = narrow(add(pentagon[(i + 4) % 5], centre));
                         let radius = RADIUS as f32;
                         let (base_radius, apex_radius) = (radius, radius);
-                        model.cones.push(Cone {
-                            base: at,
-                            base_radius,
-                            apex: before,
-                            apex_radius,
-                            material,
-                        });
-                        model.spheres.push(Sphere {
-                            centre: at,
-                            radius,
-                            material,
-                        });
+                        model.cones.push(Cone { base: at, base_radius, apex: before, apex_radius, material });
+                        model.spheres.push(Sphere { centre: at, radius, material });
                     }
                 }
             }
@@ -98,10 +65,7 @@ fn joints() -> [[V; 5]; 6] {
         [fit * libm::cos(angle), fit * libm::sin(angle), 0.0]
     });
     // The angle between neighbouring faces of a dodecahedron.
-    let tilt = Affine::turn_by(
-        X,
-        2.0 * libm::acos(libm::cos(PI / 3.0) / libm::sin(PI / 5.0)),
-    );
+    let tilt = Affine::turn_by(X, 2.0 * libm::acos(libm::cos(PI / 3.0) / libm::sin(PI / 5.0)));
     core::array::from_fn(|i| {
         if i == 0 {
             return flat;
@@ -127,12 +91,7 @@ mod tests {
             }
         }
         let fit = 1.0 / (1.0 + RADIUS);
-        assert!(
-            joints
-                .iter()
-                .flatten()
-                .all(|&v| (length(v) - fit).abs() < 1e-12)
-        );
+        assert!(joints.iter().flatten().all(|&v| (length(v) - fit).abs() < 1e-12));
     }
 
     /// The published picture shows no background: the wall fills the view.

@@ -4,13 +4,7 @@ use super::super::vector::{V, Z, narrow};
 use super::{View, scene, surface};
 use crate::model::{Mesh, Model};
 
-const VIEW: View = View {
-    eye: [0.0, 5.0, -8.0],
-    target: [0.0; 3],
-    up: Z,
-    fov_degrees: 40.0,
-    hither: 0.01,
-};
+const VIEW: View = View { eye: [0.0, 5.0, -8.0], target: [0.0; 3], up: Z, fov_degrees: 40.0, hither: 0.01 };
 
 const LIGHTS: [V; 1] = [[10.0, 10.0, -10.0]];
 
@@ -18,10 +12,7 @@ const LIGHTS: [V; 1] = [[10.0, 10.0, -10.0]];
 /// are no vertex normals.
 pub fn sombrero(size: u32) -> Model {
     let mut model = scene(&VIEW, &LIGHTS);
-    let material = model.add_material(
-        "sombrero",
-        surface([1.0, 0.1, 0.1], 0.8, 0.0, 40.0, 0.0, 1.0),
-    );
+    let material = model.add_material("sombrero", surface([1.0, 0.1, 0.1], 0.8, 0.0, 40.0, 0.0, 1.0));
     let points = 32_u32 << (size - 1);
     let cells = points - 1;
     let mut positions = Vec::with_capacity((points * points) as usize);
@@ -31,11 +22,7 @@ pub fn sombrero(size: u32) -> Model {
             // has its peak a little beside the middle.
             let sample = |k: u32| -4.0 + 8.0 * f64::from(k) / f64::from(points);
             let place = |k: u32| -4.0 + 8.0 * f64::from(k) / f64::from(cells);
-            positions.push(narrow([
-                place(j),
-                -3.0 + height(sample(j), sample(i)),
-                place(i),
-            ]));
+            positions.push(narrow([place(j), -3.0 + height(sample(j), sample(i)), place(i)]));
         }
     }
     let mut triangles = Vec::with_capacity(2 * (cells * cells) as usize);
@@ -48,13 +35,7 @@ pub fn sombrero(size: u32) -> Model {
         }
     }
     model.objects.polygons = triangles.len() as u64;
-    model.meshes.push(Mesh {
-        name: "sombrero".to_owned(),
-        positions,
-        normals: Vec::new(),
-        triangles,
-        material,
-    });
+    model.meshes.push(Mesh { name: "sombrero".to_owned(), positions, normals: Vec::new(), triangles, material });
     model
 }
 

@@ -8,13 +8,7 @@ use super::{View, scene, surface};
 use crate::model::{Mesh, Model};
 use hybray_shading::Material;
 
-const VIEW: View = View {
-    eye: [4.86, 7.2, 5.4],
-    target: [0.0; 3],
-    up: Z,
-    fov_degrees: 45.0,
-    hither: 1.0,
-};
+const VIEW: View = View { eye: [4.86, 7.2, 5.4], target: [0.0; 3], up: Z, fov_degrees: 45.0, hither: 1.0 };
 
 const LIGHTS: [V; 2] = [[-3.1, 9.8, 12.1], [11.3, 5.1, 8.8]];
 
@@ -22,23 +16,10 @@ const LIGHTS: [V; 2] = [[-3.1, 9.8, 12.1], [11.3, 5.1, 8.8]];
 pub fn teapot(size: u32) -> Model {
     let mut model = scene(&VIEW, &LIGHTS);
     for (name, shade, odd) in [("white", 1.0, 1), ("grey", 0.5, 0)] {
-        add_squares(
-            &mut model,
-            name,
-            size,
-            odd,
-            surface([shade; 3], 0.5, 0.5, 30.0, 0.0, 0.0),
-        );
+        add_squares(&mut model, name, size, odd, surface([shade; 3], 0.5, 0.5, 30.0, 0.0, 0.0));
     }
-    let material = model.add_material(
-        "teapot",
-        surface([1.0, 0.5, 0.1], 0.75, 0.25, 37.0, 0.0, 0.0),
-    );
-    let mut mesh = Mesh {
-        name: "teapot".to_owned(),
-        material,
-        ..Mesh::default()
-    };
+    let material = model.add_material("teapot", surface([1.0, 0.5, 0.1], 0.75, 0.25, 37.0, 0.0, 0.0));
+    let mut mesh = Mesh { name: "teapot".to_owned(), material, ..Mesh::default() };
     for patch in &patches() {
         tessellate(patch, size, &mut mesh);
     }
@@ -50,20 +31,14 @@ pub fn teapot(size: u32) -> Model {
 /// Adds the squares of one colour of the board, each with its own vertices.
 fn add_squares(model: &mut Model, name: &str, size: u32, odd: u32, material: Material) {
     let material = model.add_material(name, material);
-    let mut mesh = Mesh {
-        name: name.to_owned(),
-        material,
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: name.to_owned(), material, ..Mesh::default() };
     let place = |i: u32| 4.0 * (2.0 * f64::from(i) / f64::from(size) - 1.0);
     for x in 0..size {
         for y in (0..size).filter(|y| (x + y) % 2 == odd) {
             let first = mesh.positions.len() as u32;
             let corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
-            mesh.positions
-                .extend(corners.map(|(i, j)| narrow([place(i), place(j), 0.0])));
-            mesh.triangles
-                .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+            mesh.positions.extend(corners.map(|(i, j)| narrow([place(i), place(j), 0.0])));
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
             model.objects.polygons += 1;
         }
     }
@@ -134,12 +109,7 @@ fn revolve(profile: Profile, turn: f64, out: &mut Vec<Patch>) {
         out.push(profile.map(|[radius, height]| {
             // Newell's quarter circles have handles of 0.56 of the radius, the wide ring of the knob of 0.5625.
             let reach = if radius == 0.8 { 0.45 } else { 0.56 * radius };
-            let corners = [
-                [radius, 0.0],
-                [radius, reach],
-                [reach, radius],
-                [0.0, radius],
-            ];
+            let corners = [[radius, 0.0], [radius, reach], [reach, radius], [0.0, radius]];
             corners.map(|[x, y]| {
                 let [x, y] = match quarter {
                     0 => [x, y],
@@ -156,30 +126,16 @@ fn revolve(profile: Profile, turn: f64, out: &mut Vec<Patch>) {
 /// One row of the half of a tube on the side of y that `side` says.
 fn tube([inner_x, inner_z, outer_x, outer_z, width]: Ring, side: f64) -> [V; 4] {
     let y = side * width;
-    let row = [
-        [inner_x, 0.0, inner_z],
-        [inner_x, y, inner_z],
-        [outer_x, y, outer_z],
-        [outer_x, 0.0, outer_z],
-    ];
+    let row = [[inner_x, 0.0, inner_z], [inner_x, y, inner_z], [outer_x, y, outer_z], [outer_x, 0.0, outer_z]];
     // The far side runs from outer to inner: so both face outward.
-    if side < 0.0 {
-        row
-    } else {
-        [row[3], row[2], row[1], row[0]]
-    }
+    if side < 0.0 { row } else { [row[3], row[2], row[1], row[0]] }
 }
 
 /// Cubic Bernstein polynomials and their derivatives.
 fn bernstein(t: f64) -> ([f64; 4], [f64; 4]) {
     let u = 1.0 - t;
     let value = [u * u * u, 3.0 * t * u * u, 3.0 * t * t * u, t * t * t];
-    let slope = [
-        -3.0 * u * u,
-        3.0 * u * (u - 2.0 * t),
-        3.0 * t * (2.0 * u - t),
-        3.0 * t * t,
-    ];
+    let slope = [-3.0 * u * u, 3.0 * u * (u - 2.0 * t), 3.0 * t * (2.0 * u - t), 3.0 * t * t];
     (value, slope)
 }
 
@@ -211,10 +167,7 @@ fn tessellate(patch: &Patch, size: u32, mesh: &mut Mesh) {
                 // All columns meet here, so there is no tangent along the row.
                 [0.0, 0.0, if point[2] > 1.5 { 1.0 } else { -1.0 }]
             } else {
-                unit(cross(
-                    weigh(patch, row, column_slope),
-                    weigh(patch, row_slope, column),
-                ))
+                unit(cross(weigh(patch, row, column_slope), weigh(patch, row_slope, column)))
             };
             axis.push(on_axis(point));
             mesh.positions.push(narrow(point));
@@ -261,10 +214,7 @@ mod tests {
             (29, 2, 2, [-1.5, 0.84, 0.075]),
         ] {
             let found = patches[patch][row][column];
-            assert!(
-                length(sub(found, expected)) < 1e-12,
-                "{patch} {row} {column}: {found:?}"
-            );
+            assert!(length(sub(found, expected)) < 1e-12, "{patch} {row} {column}: {found:?}");
         }
     }
 
@@ -287,18 +237,12 @@ mod tests {
         let model = teapot(12);
         let mesh = model.meshes.last().expect("the teapot is the last mesh");
         assert_eq!(mesh.normals.len(), mesh.positions.len());
-        assert!(
-            mesh.normals
-                .iter()
-                .all(|n| (length(n.map(f64::from)) - 1.0).abs() < 1e-6)
-        );
+        assert!(mesh.normals.iter().all(|n| (length(n.map(f64::from)) - 1.0).abs() < 1e-6));
         for t in &mesh.triangles {
             let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
             let face = cross(sub(b, a), sub(c, a));
             assert!(length(face) > 0.0);
-            let agree = t
-                .iter()
-                .filter(|&&i| dot(face, mesh.normals[i as usize].map(f64::from)) > 0.0);
+            let agree = t.iter().filter(|&&i| dot(face, mesh.normals[i as usize].map(f64::from)) > 0.0);
             assert!(agree.count() >= 2, "{t:?}");
         }
     }

@@ -14,12 +14,7 @@ const VIEW: View = View {
 };
 
 /// Every other corner of a cube.
-const CORNERS: [V; 4] = [
-    [-1.0, -1.0, 1.0],
-    [-1.0, 1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, 1.0],
-];
+const CORNERS: [V; 4] = [[-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, 1.0]];
 
 const FACES: [[u32; 3]; 4] = [[0, 1, 2], [3, 2, 1], [2, 3, 0], [1, 0, 3]];
 
@@ -39,21 +34,13 @@ pub fn tetra(size: u32) -> Model {
     let mut waiting = vec![([0.0; 3], 1.0, size)];
     while let Some((centre, half, levels)) = waiting.pop() {
         if levels > 1 {
-            let part = |corner: &V| {
-                (
-                    add(centre, scale(*corner, half / 2.0)),
-                    half / 2.0,
-                    levels - 1,
-                )
-            };
+            let part = |corner: &V| (add(centre, scale(*corner, half / 2.0)), half / 2.0, levels - 1);
             waiting.extend(CORNERS.iter().rev().map(part));
             continue;
         }
         let first = mesh.positions.len() as u32;
-        mesh.positions
-            .extend(CORNERS.map(|corner| narrow(add(centre, scale(corner, half)))));
-        mesh.triangles
-            .extend(FACES.map(|face| face.map(|v| first + v)));
+        mesh.positions.extend(CORNERS.map(|corner| narrow(add(centre, scale(corner, half)))));
+        mesh.triangles.extend(FACES.map(|face| face.map(|v| first + v)));
     }
     model.objects.polygons = mesh.triangles.len() as u64;
     model.meshes.push(mesh);

@@ -11,13 +11,7 @@ const TAPER: f64 = 0.67;
 /// The trunk's radius; its length is 1.
 const TRUNK: f64 = 0.15;
 
-const VIEW: View = View {
-    eye: [4.5, 0.4, 2.0],
-    target: [0.0, 0.0, 1.5],
-    up: Z,
-    fov_degrees: 45.0,
-    hither: 1.0,
-};
+const VIEW: View = View { eye: [4.5, 0.4, 2.0], target: [0.0, 0.0, 1.5], up: Z, fov_degrees: 45.0, hither: 1.0 };
 
 const LIGHTS: [V; 7] = [
     [-5.0, 5.0, 50.0],
@@ -33,18 +27,8 @@ const LIGHTS: [V; 7] = [
 pub fn tree(size: u32) -> Model {
     let mut model = scene(&VIEW, &LIGHTS);
     let corner = |x: f64, y: f64| [50.0 * x, 50.0 * y, 0.0];
-    let field = [
-        corner(1.0, 1.0),
-        corner(-1.0, 1.0),
-        corner(-1.0, -1.0),
-        corner(1.0, -1.0),
-    ];
-    add_quad(
-        &mut model,
-        "field",
-        field,
-        surface([0.2, 0.7, 0.2], 1.0, 0.0, 0.0, 0.0, 0.0),
-    );
+    let field = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+    add_quad(&mut model, "field", field, surface([0.2, 0.7, 0.2], 1.0, 0.0, 0.0, 0.0, 0.0));
     let material = model.add_material("tree", surface([0.55, 0.4, 0.2], 1.0, 0.0, 0.0, 0.0, 0.0));
 
     let branches = (2_usize << size) - 1;
@@ -57,25 +41,10 @@ pub fn tree(size: u32) -> Model {
     while let Some((frame, radius, levels)) = waiting.pop() {
         let apex = narrow(frame.apply(Z));
         let apex_radius = (radius * TAPER) as f32;
-        model.cones.push(Cone {
-            base: narrow(frame.t),
-            base_radius: radius as f32,
-            apex,
-            apex_radius,
-            material,
-        });
-        model.spheres.push(Sphere {
-            centre: apex,
-            radius: apex_radius,
-            material,
-        });
+        model.cones.push(Cone { base: narrow(frame.t), base_radius: radius as f32, apex, apex_radius, material });
+        model.spheres.push(Sphere { centre: apex, radius: apex_radius, material });
         if levels > 0 {
-            waiting.extend(
-                children
-                    .iter()
-                    .rev()
-                    .map(|c| (frame.after(c), radius * TAPER, levels - 1)),
-            );
+            waiting.extend(children.iter().rev().map(|c| (frame.after(c), radius * TAPER, levels - 1)));
         }
     }
     model.objects.spheres = model.spheres.len() as u64;
@@ -88,10 +57,7 @@ fn child(tilt_degrees: f64, around_degrees: f64, length: f64) -> Affine {
     let tilt = Affine::turn_by(X, tilt_degrees * PI / 180.0);
     let around = Affine::turn_by(Z, around_degrees * PI / 180.0);
     let turn = around.after(&tilt);
-    Affine {
-        m: turn.m.map(|row| row.map(|x| x * length)),
-        t: Z,
-    }
+    Affine { m: turn.m.map(|row| row.map(|x| x * length)), t: Z }
 }
 
 #[cfg(test)]

@@ -1,0 +1,151 @@
+//! A scene ready to be traced: pages, tables, and what it requires.
+
+use crate::build::{self, BuildError, Packed, Pages};
+use crate::model::{CameraSpec, Model, Objects, Settings};
+use hybray_scheduler::Step;
+use hybray_shading::{Filter, Light, Material, spawn};
+use hybray_tracer::Scene;
+use hybray_wire::Frame;
+use std::time::{Duration, Instant};
+
+/// Samples of a pixel if nobody says.
+pub const SAMPLES: u32 = 4;
+/// Ray depth if nobody says.
+pub const DEPTH: u32 = 8;
+/// Least weight if nobody says: below half a step of an 8-bit picture.
+pub const CUTOFF: f32 = 1.0 / 512.0;
+/// Picture size if nobody says.
+pub const SIZE: [u32; 2] = [640, 480];
+
+/// A model built into pages, its tables in internal units.
+pub struct Prepared {
+    /// Pages and directory.
+    pub packed: Packed,
+    materials: Vec<Material>,
+    lights: Vec<Light>,
+    ambient: [f32; 3],
+    background: [f32; 3],
+    /// Cameras, in file units.
+    pub cameras: Vec<CameraSpec>,
+    /// Settings that the scene gives.
+    pub settings: Settings,
+    /// What the file counted.
+    pub objects: Objects,
+    /// Triangles, spheres and cones.
+    pub primitives: [u64; 3],
+    /// What could not be honoured.
+    pub warnings: Vec<String>,
+    /// How long the build took.
+    pub build_time: Duration,
+    /// Hash of pages and tables.
+    pub hash: u64,
+}
+
+impl Prepared {
+    /// Builds `model`, and lets it go.
+    ///
+    /// # Errors
+    /// See [`BuildError`].
+    pub fn new(model: Model, settings: &build::Settings) -> Result<Self, BuildError> {
+        let start = Instant::now();
+        let packed = build::build(&model, settings)?;
+        let build_time = start.elapsed();
+        let scale = libm::ldexpf(1.0, packed.scale_log2);
+        let scaled = |v: [f32; 3]| v.map(|x| x * scale);
+        let lights: Vec<Light> = model
+            .lights
+            .iter()
+            .map(|light| Light {
+                position: scaled(light.position),
+                radius: light.radius * scale,
+                u: scaled(light.u),
+                v: scaled(light.v),
+                ..*light
+            })
+            .collect();
+        let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
+        let triangles = model.meshes.iter().map(|m| m.triangles.len() as u64).sum();
+        let mut hash = packed.hash();
+        for bytes in [bytemuck::cast_slice(&materials), bytemuck::cast_slice(&lights)] {
+            hash = build::hash_bytes(hash, bytes);
+        }
+        hash = build::hash_bytes(hash, bytemuck::cast_slice(&[model.ambient, model.background]));
+        Ok(Self {
+            packed,
+            materials,
+            lights,
+            ambient: model.ambient,
+            background: model.background,
+            cameras: model.cameras,
+            settings: model.settings,
+            objects: model.objects,
+            primitives: [triangles, model.spheres.len() as u64, model.cones.len() as u64],
+            warnings: model.warnings,
+            build_time,
+            hash,
+        })
+    }
+
+    /// Lights and materials: how many.
+    #[must_use]
+    pub fn tables(&self) -> [usize; 2] {
+        [self.lights.len(), self.materials.len()]
+    }
+
+    /// Bytes of the tables that every node has.
+    #[must_use]
+    pub fn table_bytes(&self) -> u64 {
+        (size_of_val(&self.materials[..]) + size_of_val(&self.lights[..])) as u64
+    }
+
+    /// What nodes need, over opened `pages`.
+    #[must_use]
+    pub fn scene<'a>(&'a self, pages: &'a Pages<'a>) -> Scene<'a> {
+        Scene {
+            resident: pages.resident(),
+            shading: hybray_shading::Scene {
+                materials: &self.materials,
+                lights: &self.lights,
+                ambient: self.ambient,
+                ray_depth_max: DEPTH,
+                weight_cutoff: CUTOFF,
+                distance_scale: libm::ldexpf(1.0, -self.packed.scale_log2),
+                shadow_rays: spawn::shadow_rays(&self.lights),
+            },
+            background: self.background,
+            magnitude: self.packed.magnitude,
+            transmits: self.materials.iter().any(Material::transmits),
+        }
+    }
+
+    /// What is drawn: the settings of the scene, overridden by those of the caller, seen by `camera`.
+    #[must_use]
+    pub fn frame(&self, camera: &CameraSpec, wanted: &Settings) -> Frame {
+        let own = &self.settings;
+        let scale = libm::ldexpf(1.0, self.packed.scale_log2);
+        let scaled = |v: [f32; 3]| v.map(|x| x * scale);
+        let [width, height] = wanted.size.or(own.size).or(camera.size).unwrap_or(SIZE);
+        let filter = wanted.filter.as_deref().or(own.filter.as_deref()).and_then(Filter::parse);
+        Frame {
+            width,
+            height,
+            samples: wanted.spp.or(own.spp).unwrap_or(SAMPLES).clamp(1, u32::from(u16::MAX)) as u16,
+            depth_max: wanted.depth.or(own.depth).unwrap_or(DEPTH).clamp(1, hybray_scheduler::DEPTH_MAX as u32) as u8,
+            filter: filter.unwrap_or(Filter::Gaussian) as u8,
+            seed: wanted.seed.or(own.seed).unwrap_or(0),
+            weight_cutoff: wanted.cutoff.or(own.cutoff).unwrap_or(CUTOFF),
+            step_log2: Step::log2_for(self.exposure(wanted)),
+            eye: scaled(camera.eye),
+            target: scaled(camera.target),
+            up: camera.up,
+            fov_y_degrees: camera.fov_y_degrees,
+            hither: camera.hither * scale,
+        }
+    }
+
+    /// What radiance is multiplied by before it is encoded.
+    #[must_use]
+    pub fn exposure(&self, wanted: &Settings) -> f32 {
+        wanted.exposure.or(self.settings.exposure).unwrap_or(1.0)
+    }
+}

@@ -1,0 +1,233 @@
+//! Arguments.
+
+use crate::build::{Rule, Settings};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use hybray_bintree::midpoint;
+use hybray_geometry::simd::Kernels;
+use hybray_scene::PAGE_BYTES_MAX;
+use std::path::PathBuf;
+
+/// Ray-trace scenes that do not fit in any one machine, on machines of any size
+#[derive(Debug, Parser)]
+#[command(name = "hybray", version, arg_required_else_help = true, max_term_width = 110)]
+pub(super) struct Cli {
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Verb {
+    /// Render a scene to a picture
+    Render(RenderArgs),
+    /// Say what a scene holds and what it takes
+    Info(InfoArgs),
+    /// Answer rays from standard input: `t primitive u v nx ny nz` or `miss`
+    Trace(TraceArgs),
+    /// Write a scene in another format: .nff, .obj (with .mtl) or .pov
+    Convert(ConvertArgs),
+    /// List the built-in scenes
+    Scenes,
+    /// Print a shell's completion script
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page
+    Man,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SceneArgs {
+    /// A file (.obj, .nff, .toml), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
+    pub scene: String,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct TreeArgs {
+    /// How the tree is split. The picture does not depend on it
+    #[arg(long, value_enum, default_value_t = Tree::Sah, help_heading = "Tree")]
+    pub tree: Tree,
+    /// Depth limit of the midpoint rule
+    #[arg(long, default_value_t = 18, value_parser = clap::value_parser!(u32).range(1..=48), help_heading = "Tree")]
+    pub cell_depth: u32,
+    /// Objects in a cell that the midpoint rule does not split
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Tree")]
+    pub cell_objects: u32,
+    /// Most bytes of a page
+    #[arg(long, default_value_t = PAGE_BYTES_MAX as u32, value_parser = clap::value_parser!(u32).range(4096..=65536), help_heading = "Tree")]
+    pub page_bytes: u32,
+}
+
+impl TreeArgs {
+    pub fn settings(&self) -> Settings {
+        let rule = match self.tree {
+            Tree::Sah => Rule::SurfaceArea,
+            Tree::Midpoint => {
+                Rule::Midpoint(midpoint::Settings { depth_max: self.cell_depth, objects_max: self.cell_objects })
+            }
+        };
+        Settings { rule, page_bytes: self.page_bytes as usize }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Tree {
+    /// Surface-area heuristic
+    Sah,
+    /// Midpoints, as in the 1995 report
+    Midpoint,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum KernelChoice {
+    /// The best that this processor has
+    Auto,
+    /// Plain code, the same bits
+    Portable,
+}
+
+impl KernelChoice {
+    pub fn kernels(self) -> Kernels {
+        match self {
+            Self::Auto => Kernels::detect(),
+            Self::Portable => Kernels::Portable,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where the picture goes: .png, .exr (linear) or .ppm; `-` is standard output (PNG). Default: the scene's name, .png
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Columns and rows, pixels
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Samples a pixel, 1 to 65535. One sample goes through the middle of the pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    pub spp: Option<u32>,
+    /// Ray depth, 1 to 64: 1 is what is seen directly and its shadows
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub depth: Option<u32>,
+    /// Rays with less weight than this are not traced, 0 to 1
+    #[arg(long, value_name = "W", value_parser = fraction)]
+    pub cutoff: Option<f32>,
+    /// How samples are spread around the pixel
+    #[arg(long, value_parser = ["box", "tent", "gaussian"])]
+    pub filter: Option<String>,
+    /// Radiance is multiplied by this before it is encoded
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub exposure: Option<f32>,
+    /// Which of the scene's cameras
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Seed of every random choice
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Bits of a PNG's channel
+    #[arg(long, value_parser = ["8", "16"], default_value = "8")]
+    pub bits: String,
+    /// Write a report in JSON to this file, or to standard output (`-`)
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Nodes: threads that trace, 1 to 1024. Default: as many as there are cores
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Farm (none of these changes the picture)")]
+    pub nodes: Option<u16>,
+    /// Where tiles are given out (POV||Ray, section 2.2)
+    #[arg(long, value_enum, default_value_t = Where::Host, help_heading = "Farm (none of these changes the picture)")]
+    pub dispatcher: Where,
+    /// T of POV||Ray's rule W / (1 + T (N - 1)), 1 and up. Default: 2.5 to start, then learned
+    #[arg(long, value_name = "T", value_parser = at_least_one, help_heading = "Farm (none of these changes the picture)")]
+    pub spread: Option<f32>,
+    /// Side in pixels of the least piece that is given out: 8, 16, 32 .. 512. Default: adapted to what tiles cost
+    #[arg(long, value_name = "PIXELS", value_parser = tile, help_heading = "Farm (none of these changes the picture)")]
+    pub tile: Option<u32>,
+    /// Which kernels to run. `HYBRAY_KERNELS` gives the default
+    #[arg(long, value_enum, env = "HYBRAY_KERNELS", default_value_t = KernelChoice::Auto, help_heading = "Farm (none of these changes the picture)")]
+    pub kernels: KernelChoice,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Where {
+    /// By the host, beside the film
+    Host,
+    /// By the first node, near the others
+    Node,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct InfoArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct TraceArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Rays are packed little-endian f32, eight each (ox oy oz dx dy dz tmin tmax), and so are answers: t u v nx ny nz as f32
+    /// after the primitive as u32 (4294967295 and t infinite for a miss)
+    #[arg(long)]
+    pub binary: bool,
+    /// Which kernels to run. `HYBRAY_KERNELS` gives the default
+    #[arg(long, value_enum, env = "HYBRAY_KERNELS", default_value_t = KernelChoice::Auto)]
+    pub kernels: KernelChoice,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ConvertArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// What to write: .nff, .obj or .pov
+    pub output: PathBuf,
+    /// Which of the scene's cameras
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Columns and rows, pixels, for formats that say so
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let side_max = hybray_wire::TileMap::SIDE_MAX;
+    match parsed {
+        Some(size) if size.iter().all(|s| (1..=side_max).contains(s)) => Ok(size),
+        Some(_) => Err(format!("a picture has 1 to {side_max} columns and rows, such as 640x480")),
+        None => Err("give columns and rows, such as 640x480".to_owned()),
+    }
+}
+
+fn number(text: &str, what: &str, holds: impl Fn(f32) -> bool) -> Result<f32, String> {
+    text.parse().ok().filter(|&x| holds(x)).ok_or_else(|| format!("give a number {what}"))
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    number(text, "from 0 to 1, such as 0.002", |x| (0.0..=1.0).contains(&x))
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    number(text, "above 0, such as 1.5", |x| x > 0.0 && x.is_finite())
+}
+
+fn at_least_one(text: &str) -> Result<f32, String> {
+    number(text, "of 1 or more, such as 2.5", |x| x >= 1.0)
+}
+
+fn tile(text: &str) -> Result<u32, String> {
+    text.parse()
+        .ok()
+        .filter(|side: &u32| side.is_power_of_two() && (8..=512).contains(side))
+        .ok_or_else(|| "give 8, 16, 32, 64, 128, 256 or 512".to_owned())
+}

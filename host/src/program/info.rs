@@ -1,0 +1,86 @@
+//! `hybray info` and `hybray scenes`.
+
+use super::args::InfoArgs;
+use super::report::peak_bytes;
+use super::{End, load};
+use crate::prepare::Prepared;
+use crate::{builtin, framing};
+use anyhow::Result;
+use std::io::Write;
+
+pub(super) fn run(args: &InfoArgs) -> Result<End> {
+    let (model, import_time) = load(&args.scene, None)?;
+    let bounds = framing::bounds(&model);
+    let normals = model.meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len()).sum::<usize>();
+    let prepared = Prepared::new(model, &args.tree.settings())?;
+    let pages = prepared.packed.open()?;
+    let scene = prepared.scene(&pages);
+    let nodes = scene.resident.pages.iter().map(|p| p.nodes.len()).sum::<usize>();
+    let out = &mut std::io::stdout().lock();
+    let o = &prepared.objects;
+    let [triangles, spheres, cones] = prepared.primitives;
+    let primitives = (triangles + spheres + cones).max(1);
+    let [lights, materials] = prepared.tables();
+    writeln!(out, "scene        {}", args.scene.scene)?;
+    writeln!(
+        out,
+        "objects      {} polygons, {} spheres, {} cones, {} cylinders",
+        o.polygons, o.spheres, o.cones, o.cylinders
+    )?;
+    writeln!(
+        out,
+        "primitives   {triangles} triangles ({normals} with vertex normals), {spheres} spheres, {cones} cones"
+    )?;
+    writeln!(out, "tables       {lights} lights, {materials} materials")?;
+    let cameras: Vec<_> = prepared.cameras.iter().map(|c| format!("`{}`", c.name)).collect();
+    writeln!(out, "cameras      {}", cameras.join(", "))?;
+    if let Some((lo, hi)) = bounds {
+        writeln!(out, "extent       {lo:?} to {hi:?}")?;
+    }
+    let mut requires = vec!["mirrors and shadows"];
+    requires.extend(scene.transmits.then_some("refraction"));
+    requires.extend((normals > 0).then_some("vertex normals"));
+    writeln!(out, "requires     {}", requires.join(", "))?;
+    let bytes = prepared.packed.page_bytes();
+    writeln!(
+        out,
+        "pages        {} in {bytes} bytes: {:.1} bytes a primitive, {nodes} nodes",
+        prepared.packed.pages(),
+        bytes as f64 / primitives as f64
+    )?;
+    writeln!(
+        out,
+        "every node   {} bytes of directory, {} bytes of tables",
+        prepared.packed.directory_bytes(),
+        prepared.table_bytes()
+    )?;
+    writeln!(
+        out,
+        "time         import {:.3} s, build {:.3} s",
+        import_time.as_secs_f64(),
+        prepared.build_time.as_secs_f64()
+    )?;
+    if let Some(peak) = peak_bytes() {
+        writeln!(out, "peak         {peak} bytes: {:.1} bytes a primitive", peak as f64 / primitives as f64)?;
+    }
+    for warning in &prepared.warnings {
+        writeln!(out, "warning      {warning}")?;
+    }
+    Ok(End::Done)
+}
+
+pub(super) fn list_builtin() -> Result<End> {
+    let out = &mut std::io::stdout().lock();
+    for scene in builtin::names() {
+        let name = scene.name;
+        match &scene.size {
+            Some(size) => {
+                let full = format!("{name}[:{}]", size.default);
+                let range = format!("{} from {} to {}", size.counts, size.smallest, size.largest);
+                writeln!(out, "{full:28} {} ({range})", scene.about)?;
+            }
+            None => writeln!(out, "{name:28} {}", scene.about)?,
+        }
+    }
+    Ok(End::Done)
+}

@@ -1,0 +1,90 @@
+//! The `hybray` program: arguments, then one match.
+//!
+//! Results go to standard output, talk to standard error. Exit codes: 0 done, 1 an error (one line says what to do), 2 wrong
+//! arguments, 130 interrupted.
+
+mod args;
+mod convert;
+mod info;
+mod render;
+mod report;
+mod show;
+mod trace;
+
+use anyhow::{Context, Result, anyhow};
+use args::{Cli, SceneArgs, Verb};
+use clap::{CommandFactory, Parser};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use crate::model::{CameraSpec, Model};
+use crate::{framing, import};
+
+/// How a command ended well.
+enum End {
+    Done,
+    Interrupted,
+}
+
+/// Runs the program with this process's arguments.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let end = match cli.verb {
+        Verb::Render(args) => render::run(&args),
+        Verb::Info(args) => info::run(&args),
+        Verb::Trace(args) => trace::run(&args),
+        Verb::Convert(args) => convert::run(&args),
+        Verb::Scenes => info::list_builtin(),
+        Verb::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "hybray", &mut std::io::stdout());
+            Ok(End::Done)
+        }
+        Verb::Man => man(),
+    };
+    match end {
+        Ok(End::Done) => ExitCode::SUCCESS,
+        Ok(End::Interrupted) => ExitCode::from(130),
+        Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One line, whatever an error from below thinks.
+            let text = format!("{error:#}").split_whitespace().collect::<Vec<_>>().join(" ");
+            eprintln!("hybray: {text}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// `hybray ... | head` is no error.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .any(|cause| cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
+}
+
+fn man() -> Result<End> {
+    clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout())?;
+    Ok(End::Done)
+}
+
+/// Reads a scene, and gives it a camera and lights if it has none.
+fn load(args: &SceneArgs, size: Option<[u32; 2]>) -> Result<(Model, Duration)> {
+    let start = Instant::now();
+    let mut model = import::load(&args.scene)?;
+    if size.is_some() {
+        model.settings.size = size;
+    }
+    framing::complete_with_up(&mut model, import::up_axis(&args.scene));
+    Ok((model, start.elapsed()))
+}
+
+/// The camera called `name`, or the first.
+fn camera<'a>(cameras: &'a [CameraSpec], name: Option<&str>) -> Result<&'a CameraSpec> {
+    let Some(name) = name else {
+        return cameras.first().context("the scene has nothing that a camera could look at");
+    };
+    cameras.iter().find(|camera| camera.name == name).ok_or_else(|| {
+        let names: Vec<_> = cameras.iter().map(|camera| format!("`{}`", camera.name)).collect();
+        anyhow!("the scene has no camera `{name}`; it has {}", names.join(", "))
+    })
+}

@@ -1,0 +1,209 @@
+//! `hybray render`.
+
+use super::args::{RenderArgs, Where};
+use super::report::{Counts, Memory, Node, Rays, Report, ReportFile, Seconds, peak_bytes};
+use super::show::{Show, rays_per_second};
+use super::{End, camera, load};
+use crate::model::Settings;
+use crate::picture::{Format, Output, Picture};
+use crate::prepare::Prepared;
+use anyhow::{Context, Result, bail};
+use hybray_native::{DispatcherAt, Farm, Traced, trace};
+use hybray_scheduler::{Options, Outcome};
+use hybray_wire::Frame;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+pub(super) fn run(args: &RenderArgs) -> Result<End> {
+    let start = Instant::now();
+    // What could go wrong at the end is tried at the beginning.
+    let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene));
+    let output = Output::create(&path, Format::of(&path, args.bits == "16")?)?;
+    let json = args.json.as_deref().map(ReportFile::create).transpose()?;
+    if path == Path::new("-") && args.json.as_deref() == Some(Path::new("-")) {
+        bail!("the picture and the report cannot both go to standard output: give one of them a file");
+    }
+
+    let mut show = Show::new(args.quiet);
+    let (model, import_time) = load(&args.scene, args.size)?;
+    model.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
+    let camera = camera(&model.cameras, args.camera.as_deref())?.clone();
+    show.line(&format!("{}: {} primitives", args.scene.scene, model.primitives()));
+    let mut prepared = Prepared::new(model, &args.tree.settings())?;
+    let wanted = Settings {
+        size: args.size,
+        spp: args.spp,
+        depth: args.depth,
+        cutoff: args.cutoff,
+        filter: args.filter.clone(),
+        exposure: args.exposure,
+        seed: args.seed,
+    };
+    let frame = prepared.frame(&camera, &wanted);
+    let exposure = prepared.exposure(&wanted);
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
+    let farm = Farm {
+        nodes: args.nodes.unwrap_or(cores),
+        kernels: args.kernels.kernels(),
+        dispatcher: match args.dispatcher {
+            Where::Host => DispatcherAt::Host,
+            Where::Node => DispatcherAt::Node,
+        },
+        options: Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) },
+    };
+
+    let interrupted = interrupts()?;
+    let pages = prepared.packed.open()?;
+    let scene = prepared.scene(&pages);
+    show.begin();
+    let trace_start = Instant::now();
+    let traced = trace(&scene, prepared.hash, &frame, &farm, &mut |progress| {
+        show.progress(progress);
+        !interrupted.load(Ordering::Relaxed)
+    })
+    .context("the picture has no pixels, or too many: give --size, such as 640x480")?;
+    let trace_time = trace_start.elapsed();
+    show.end();
+    drop(pages);
+
+    match traced.outcome {
+        Outcome::Finished | Outcome::Stopped => {}
+        Outcome::Unbalanced { tile } => bail!("tile {tile} lost a ray twice: please report this, with the scene"),
+        Outcome::Stranger { peer } => bail!("node {peer} has another scene or version"),
+        Outcome::Abandoned => bail!("every node was lost before the picture was finished"),
+    }
+    prepared.warnings.extend(film_warnings(&traced));
+    let rays = total_rays(&traced);
+    output.write(&picture(&frame, &traced), exposure)?;
+    let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
+    if let Some(json) = json {
+        json.write(&report(args, &prepared, &frame, &farm, &traced, seconds))?;
+    }
+    film_warnings(&traced).for_each(|warning| show.line(&format!("warning: {warning}")));
+    show.line(&format!(
+        "{} x {}, {} sample{}: {rays} rays in {:.2} s, {}; import {:.2} s, build {:.2} s",
+        frame.width,
+        frame.height,
+        frame.samples,
+        if frame.samples == 1 { "" } else { "s" },
+        trace_time.as_secs_f64(),
+        rays_per_second(rays, trace_time),
+        import_time.as_secs_f64(),
+        prepared.build_time.as_secs_f64(),
+    ));
+    if traced.outcome == Outcome::Stopped {
+        let done = traced.progress;
+        show.line(&format!("interrupted: {} of {} tiles are in {}", done.finished, done.tiles, path.display()));
+        return Ok(End::Interrupted);
+    }
+    show.line(&format!("{}", path.display()));
+    Ok(End::Done)
+}
+
+/// `spd:balls:4` becomes `spd-balls-4.png`, `models/cow.obj` becomes `cow.png`, in this folder.
+fn default_output(scene: &str) -> PathBuf {
+    let stem = Path::new(scene).file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy().into_owned());
+    PathBuf::from(format!("{}.png", stem.replace(':', "-")))
+}
+
+/// True from the first Ctrl-C on; a second one ends the program at once.
+fn interrupts() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if seen.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("this system has no way to tell of Ctrl-C")?;
+    Ok(flag)
+}
+
+fn picture(frame: &Frame, traced: &Traced) -> Picture {
+    Picture { width: frame.width, height: frame.height, rgb: traced.radiance.as_flattened().to_vec() }
+}
+
+fn film_warnings(traced: &Traced) -> impl Iterator<Item = String> + use<> {
+    let sum = |f: fn(&hybray_wire::Counts) -> u64| traced.nodes.iter().map(|n| f(&n.counts)).sum::<u64>();
+    let (refused, clamped) = (sum(|c| c.refused), sum(|c| c.clamped));
+    let frames = traced.refused_frames;
+    [
+        (refused > 0).then(|| format!("{refused} contributions were negative or not finite, and were left out")),
+        (clamped > 0).then(|| format!("{clamped} contributions were too bright for the film, and were cut")),
+        (frames > 0).then(|| format!("{frames} frames from nodes made no sense, and were left out")),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+fn total_rays(traced: &Traced) -> u64 {
+    traced.nodes.iter().map(|n| n.counts.primary + n.counts.secondary + n.counts.shadow).sum()
+}
+
+fn report(
+    args: &RenderArgs,
+    prepared: &Prepared,
+    frame: &Frame,
+    farm: &Farm,
+    traced: &Traced,
+    [import, build, trace, total]: [Duration; 4],
+) -> Report {
+    let mut counts = hybray_wire::Counts::default();
+    traced.nodes.iter().for_each(|node| counts += node.counts);
+    let [triangles, spheres, cones] = prepared.primitives;
+    let [lights, materials] = prepared.tables().map(|n| n as u64);
+    let peak_bytes = peak_bytes();
+    let primitives = (triangles + spheres + cones).max(1);
+    Report {
+        scene: args.scene.scene.clone(),
+        width: frame.width,
+        height: frame.height,
+        samples: frame.samples,
+        film: format!("{:016x}", traced.film),
+        finished: traced.outcome == Outcome::Finished,
+        seconds: Seconds {
+            import: import.as_secs_f64(),
+            build: build.as_secs_f64(),
+            trace: trace.as_secs_f64(),
+            total: total.as_secs_f64(),
+        },
+        rays: Rays { primary: counts.primary, secondary: counts.secondary, shadow: counts.shadow },
+        counts: Counts {
+            triangles,
+            spheres,
+            cones,
+            lights,
+            materials,
+            pages: prepared.packed.pages() as u64,
+            tiles: traced.progress.tiles,
+            hits: counts.hits,
+            contributions: counts.contributions,
+            refused: counts.refused,
+            clamped: counts.clamped,
+            walk_nodes: traced.walks.nodes,
+            walk_blocks: traced.walks.blocks,
+            walk_pages: traced.walks.pages,
+        },
+        memory: Memory {
+            page_bytes: prepared.packed.page_bytes(),
+            directory_bytes: prepared.packed.directory_bytes(),
+            table_bytes: prepared.table_bytes(),
+            peak_bytes,
+            peak_bytes_per_primitive: peak_bytes.map(|peak| peak as f64 / primitives as f64),
+        },
+        kernels: farm.kernels.name(),
+        nodes: (1..)
+            .zip(&traced.nodes)
+            .map(|(node, n)| Node {
+                node,
+                tiles: n.tiles,
+                runs: n.runs,
+                rays: n.counts.primary + n.counts.secondary + n.counts.shadow,
+                busy_seconds: n.busy_nanoseconds as f64 * 1e-9,
+            })
+            .collect(),
+        warnings: prepared.warnings.clone(),
+    }
+}
