@@ -3,7 +3,7 @@
 use crate::build::{self, BuildError, Packed, Pages};
 use crate::model::{CameraSpec, Model, Objects, Settings};
 use hybray_scheduler::Step;
-use hybray_shading::{Filter, Light, Material, spawn};
+use hybray_shading::{Filter, Light, LightKind, Material, spawn};
 use hybray_tracer::Scene;
 use hybray_wire::Frame;
 use std::time::{Duration, Instant};
@@ -33,6 +33,8 @@ pub struct Prepared {
     pub objects: Objects,
     /// Triangles, spheres and cones.
     pub primitives: [u64; 3],
+    /// Triangles with vertex normals.
+    pub smooth: u64,
     /// What could not be honoured.
     pub warnings: Vec<String>,
     /// How long the build took.
@@ -65,6 +67,7 @@ impl Prepared {
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
         let triangles = model.meshes.iter().map(|m| m.triangles.len() as u64).sum();
+        let smooth = model.meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len() as u64).sum();
         let mut hash = packed.hash();
         for bytes in [bytemuck::cast_slice(&materials), bytemuck::cast_slice(&lights)] {
             hash = build::hash_bytes(hash, bytes);
@@ -80,10 +83,31 @@ impl Prepared {
             settings: model.settings,
             objects: model.objects,
             primitives: [triangles, model.spheres.len() as u64, model.cones.len() as u64],
+            smooth,
             warnings: model.warnings,
             build_time,
             hash,
         })
+    }
+
+    /// What the scene requires of a node beyond primary rays, in words (DESIGN section 2, law 6).
+    #[must_use]
+    pub fn requires(&self) -> Vec<&'static str> {
+        let area = |l: &Light| matches!(l.kind(), LightKind::Sphere | LightKind::Rectangle);
+        let [triangles, spheres, cones] = self.primitives;
+        [
+            (triangles > 0, "triangles"),
+            (self.smooth > 0, "vertex normals"),
+            (spheres > 0, "spheres"),
+            (cones > 0, "cones"),
+            (!self.lights.is_empty(), "shadow rays"),
+            (self.lights.iter().any(area), "area lights"),
+            (self.materials.iter().any(Material::mirrors), "mirrored rays"),
+            (self.materials.iter().any(Material::transmits), "refracted rays"),
+        ]
+        .into_iter()
+        .filter_map(|(required, what)| required.then_some(what))
+        .collect()
     }
 
     /// Lights and materials: how many.

@@ -1,5 +1,9 @@
-//! What the whole-system tests share: random numbers from a seed, scenes that are awkward, and brute force.
+//! What the whole-system tests share: random numbers from a seed, scenes that are awkward, brute force, and pictures.
 #![forbid(unsafe_code)]
+
+mod picture;
+
+pub use picture::{Picture, drawn, kernels, scene};
 
 use hybray::build::Source;
 use hybray::model::{Mesh, Model, NamedMaterial, Sphere};
@@ -27,6 +31,14 @@ impl Random {
     /// Below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
+    }
+
+    /// The same things in another order.
+    pub fn shuffled<T>(&mut self, mut things: Vec<T>) -> Vec<T> {
+        for i in (1..things.len()).rev() {
+            things.swap(i, self.below(i + 1));
+        }
+        things
     }
 
     /// In the cube from -1 to 1.

@@ -123,8 +123,8 @@ impl<S: Simd> BoxRay<S> {
     #[inline(always)]
     fn new(simd: S, ray: &RayKernel) -> Self {
         Self {
-            origin: ray.origin.map(|x| simd.splat8(x)),
-            inverse: ray.inverse.map(|x| simd.splat8(x)),
+            origin: simd.splat8_axes(ray.origin),
+            inverse: simd.splat8_axes(ray.inverse),
             negative: ray.inverse.map(f32::is_sign_negative),
             t_min: simd.splat8(ray.t_min),
         }
@@ -244,14 +244,15 @@ impl<S: Simd> Walker<S> {
         match kind {
             Kind::Triangle => {
                 for (i, block) in page.triangles[start..start + count].iter().enumerate() {
-                    let v = block.v.map(|vertex| vertex.map(|lane| self.simd.load4(&lane)));
+                    let simd = self.simd;
+                    let v = [simd.load4_axes(&block.v[0]), simd.load4_axes(&block.v[1]), simd.load4_axes(&block.v[2])];
                     let (t, hit) = triangle_lanes(&self.lanes, &v);
                     self.keep(t, hit, &block.id, number, kind, start + i);
                 }
             }
             Kind::Sphere => {
                 for (i, block) in page.spheres[start..start + count].iter().enumerate() {
-                    let centre = block.centre.map(|lane| self.simd.load4(&lane));
+                    let centre = self.simd.load4_axes(&block.centre);
                     let (t, hit) = sphere_lanes(&self.lanes, &centre, self.simd.load4(&block.radius));
                     self.keep(t, hit, &block.id, number, kind, start + i);
                 }

@@ -89,7 +89,7 @@ impl Aabb {
 
 /// What a slab's far side is widened by: two units in the last place, the error of the reciprocal, the difference and
 /// the product together (Ize, *Robust BVH Ray Traversal*, 2013).
-const WIDEN: f32 = 1.0 + 2.0 * f32::EPSILON;
+pub const SLAB_WIDEN: f32 = 1.0 + 2.0 * f32::EPSILON;
 
 /// The interval of `t` in which each ray is inside its box, given the planes that it meets first and last on each axis.
 ///
@@ -104,5 +104,5 @@ pub fn slab<F: Lanes>(origin: &[F; 3], inverse: &[F; 3], near_planes: &[F; 3], f
         entry = ((near_planes[i] - origin[i]) * inverse[i]).or_greater(entry);
         exit = ((far_planes[i] - origin[i]) * inverse[i]).or_less(exit);
     }
-    (entry, exit * exit.splat_like(WIDEN))
+    (entry, exit * exit.splat_like(SLAB_WIDEN))
 }

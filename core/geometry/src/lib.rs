@@ -26,7 +26,7 @@ pub mod simd;
 mod sphere;
 mod triangle;
 
-pub use aabb::{Aabb, slab};
+pub use aabb::{Aabb, SLAB_WIDEN, slab};
 pub use bundle::Bundle;
 pub use cone::Cone;
 pub use glam::Vec3;

@@ -112,22 +112,28 @@ pub fn ray_lanes<F: Lanes>(like: F, rays: &[RayKernel]) -> Option<LaneRay<F>> {
     if rays.len() != F::LANES || rays.iter().any(|r| r.axes != first.axes) {
         return None;
     }
-    let gather = |f: &dyn Fn(&RayKernel) -> f32| {
-        let mut array = like.to_array();
-        for (lane, ray) in array.as_mut().iter_mut().zip(rays) {
-            *lane = f(ray);
-        }
-        like.load_like(&array)
-    };
-    let three = |f: &dyn Fn(&RayKernel) -> [f32; 3]| [gather(&|r| f(r)[0]), gather(&|r| f(r)[1]), gather(&|r| f(r)[2])];
     Some(LaneRay {
-        origin: three(&|r| r.origin),
-        direction: three(&|r| r.direction),
-        inverse: three(&|r| r.inverse),
+        origin: three(like, rays, |r| &r.origin),
+        direction: three(like, rays, |r| &r.direction),
+        inverse: three(like, rays, |r| &r.inverse),
         axes: first.axes,
-        shear: three(&|r| r.shear),
-        t_min: gather(&|r| r.t_min),
+        shear: three(like, rays, |r| &r.shear),
+        t_min: gather(like, rays, |r| r.t_min),
     })
+}
+
+#[inline(always)]
+fn gather<F: Lanes>(like: F, rays: &[RayKernel], get: impl Fn(&RayKernel) -> f32) -> F {
+    let mut array = like.to_array();
+    for (lane, ray) in array.as_mut().iter_mut().zip(rays) {
+        *lane = get(ray);
+    }
+    like.load_like(&array)
+}
+
+#[inline(always)]
+fn three<F: Lanes>(like: F, rays: &[RayKernel], get: impl Fn(&RayKernel) -> &[f32; 3]) -> [F; 3] {
+    [gather(like, rays, |r| get(r)[0]), gather(like, rays, |r| get(r)[1]), gather(like, rays, |r| get(r)[2])]
 }
 
 impl<F: Lanes> LaneRay<F> {

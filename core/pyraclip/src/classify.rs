@@ -98,7 +98,7 @@ impl Outcodes {
         codes
     }
 
-    /// Whether every vertex is surely before the apex. Only then can a cell be looked at as the paper does, as its
+    /// Whether every vertex is surely ahead of the apex. Only then can a cell be looked at as the paper does, by its
     /// central projection upon a plane in which the pyramid is a convex quadrilateral P.
     pub fn ahead(&self) -> bool {
         self.maybe[4] == 0
@@ -125,20 +125,20 @@ impl Outcodes {
             // A vertex in P, or not surely elsewhere.
             return First::Partly;
         }
-        if self.ahead() {
-            // A vertex in each: what lies between B and G, or D and E, crosses P from side to side.
-            let b = top & !(left | right | bottom);
-            let g = bottom & !(left | right | top);
-            let d = left & !(bottom | top | right);
-            let e = right & !(bottom | top | left);
-            if (b != 0 && g != 0) || (d != 0 && e != 0) {
-                return First::Partly;
-            }
-            // Whatever convex shape reaches into A, C, F and H contains P: a line that held it off P would have P's
-            // corner nearest to it on the wrong side of what is in that corner's subspace.
-            if [left & top, right & top, left & bottom, right & bottom].iter().all(|&m| m != 0) {
-                return First::Partly;
-            }
+        // A vertex in each of B and G, or D and E: what lies between them is never outside the planes that it passes
+        // between, so it crosses P from side to side.
+        let b = top & !(left | right | bottom);
+        let g = bottom & !(left | right | top);
+        let d = left & !(bottom | top | right);
+        let e = right & !(bottom | top | left);
+        if (b != 0 && g != 0) || (d != 0 && e != 0) {
+            return First::Partly;
+        }
+        // Whatever convex shape ahead of the apex reaches into A, C, F and H contains P: a line that held it off P
+        // would have P's corner nearest to it on the wrong side of what is in that corner's subspace.
+        let corners = [left & top, right & top, left & bottom, right & bottom];
+        if self.ahead() && corners.iter().all(|&m| m != 0) {
+            return First::Partly;
         }
         First::Unsure
     }
@@ -148,8 +148,12 @@ impl Outcodes {
 mod tests {
     use super::*;
 
-    /// Left, right, bottom and top bits of eight vertices, all surely ahead: what the first test says.
+    /// Vertices in these subspaces, all surely ahead: what the first test says.
     fn check(vertices: [&str; 8], expected: First) {
+        assert_eq!(codes(vertices).first_test(), expected, "{vertices:?}");
+    }
+
+    fn codes(vertices: [&str; 8]) -> Outcodes {
         let mut codes = Outcodes { sure: [0; 5], maybe: [0; 5] };
         for (v, sector) in vertices.into_iter().enumerate() {
             let planes: &[usize] = match sector {
@@ -168,12 +172,17 @@ mod tests {
                 codes.maybe[plane] |= 1 << v;
             }
         }
-        assert_eq!(codes.first_test(), expected, "{vertices:?}");
-        // Behind the apex or in doubt, the bits prove no overlap but that of a vertex in P.
-        codes.maybe[4] = 1;
-        let in_p = codes.sure[..4].iter().fold(0, |a, b| a | b) != ALL;
-        let expected = if expected == First::Partly && !in_p { First::Unsure } else { expected };
-        assert_eq!(codes.first_test(), expected, "{vertices:?}");
+        codes
+    }
+
+    #[test]
+    fn corners_tell_only_of_cells_ahead() {
+        let mut around = codes(["A", "C", "F", "H", "H", "F", "C", "A"]);
+        around.maybe[4] = 1;
+        assert_eq!(around.first_test(), First::Unsure);
+        around.maybe[4] = ALL;
+        around.sure[4] = ALL;
+        assert_eq!(around.first_test(), First::Outside);
     }
 
     #[test]

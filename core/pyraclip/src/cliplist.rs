@@ -9,8 +9,8 @@ use hybray_geometry::Aabb;
 /// Levels below the root that a tree may have.
 pub const MAX_DEPTH: usize = 64;
 
-/// Bytes of [`clip`]'s stack for cells of four bytes: one entry for each level, of 128 bytes of distances, 16 of margins,
-/// 24 of planes, 4 of cell and 2 of flags.
+/// Bytes of [`clip`]'s stack for cells of four bytes: one entry for each level, of 128 bytes of distances, 16 of
+/// margins, 24 of planes, 4 of cell and 2 of flags.
 pub const STACK_BYTES: usize = MAX_DEPTH * size_of::<Entry<u32>>();
 
 const _: () = assert!(STACK_BYTES <= MAX_DEPTH * 176);
@@ -88,8 +88,8 @@ struct Entry<C> {
 
 /// Gives `visit` every leaf that a ray of `pyramid` may touch, front to back, until it breaks off.
 ///
-/// Front to back: a ray that passes through the insides of two leaves leaves the earlier one no later than it enters the
-/// other. So one order is good for all rays from the apex. Empty leaves are left out.
+/// Front to back: a ray that passes through the insides of two leaves leaves the earlier one no later than it enters
+/// the other. So one order is good for all rays from the apex. Empty leaves are left out.
 ///
 /// Bounded by the tree: a cell is looked at once, and none below [`MAX_DEPTH`]. The walk keeps [`STACK_BYTES`] on the
 /// caller's stack.
@@ -238,6 +238,34 @@ mod tests {
         fn is_empty(&self, (_, aabb): Cut) -> bool {
             aabb.lo.x > 0.7
         }
+    }
+
+    /// Its lower half is cut for ever, at 2 to minus the level.
+    struct Comb;
+
+    impl Bintree for Comb {
+        type Cell = Option<u8>;
+        fn root(&self) -> (Option<u8>, Aabb) {
+            (Some(0), Aabb { lo: Vec3::new(0.0, -1.0, -1.0), hi: Vec3::ONE })
+        }
+        fn split(&self, cell: Option<u8>) -> Option<Split<Option<u8>>> {
+            let level = cell?.saturating_add(1);
+            let plane = f32::from_bits((127 - u32::from(level.min(126))) << 23);
+            Some(Split { axis: 0, plane, lower: Some(level), upper: None })
+        }
+        fn is_empty(&self, _: Option<u8>) -> bool {
+            false
+        }
+    }
+
+    #[test]
+    fn a_comb_is_too_deep_though_one_entry_is_enough_for_it() {
+        let mut teeth = 0;
+        let flow = clip(&Comb, &along(Vec3::NEG_X, 0.1), &mut ClipCounts::default(), |_| {
+            teeth += 1;
+            ControlFlow::Continue(())
+        });
+        assert_eq!((flow, teeth), (Err(ClipError::TooDeep), MAX_DEPTH));
     }
 
     fn along(direction: Vec3, width: f32) -> ClipPyramid {

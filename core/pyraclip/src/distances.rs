@@ -10,13 +10,14 @@ use hybray_geometry::{Aabb, Vec3, gamma};
 ///
 /// `margin[i]` bounds, for plane `i` with leaned normal `n`, the sum of two things:
 ///
-/// 1. *What a distance is off by*: `|of[i][v] - n . (vertex v - apex)|`, for the vertex whose coordinates are the cell's
-///    `f32` planes.
+/// 1. *What a distance is off by*: `|of[i][v] - n . (vertex v - apex)|`, for the vertex whose coordinates are the
+///    cell's `f32` planes.
 /// 2. *What the slab test is off by*: a ray is taken to be in a cell at any `t` of its `f32` slab interval, whose ends
-///    are off by gamma(3) (difference, reciprocal, product) and gamma(5) more at the far side, which is widened. At such a
-///    `t` the ray is within gamma(8) |plane - apex| of the cell on each axis; that changes its distance from plane `i` by
-///    gamma(8) S, where S is the sum over the axes of |n| times the root's greatest |plane - apex|. (A component of a
-///    direction whose reciprocal overflows moves the ray by less than 2^-28 of that way: [`ClipPyramid::holds`].)
+///    are off by gamma(3) (difference, reciprocal, product) and gamma(5) more at the far side, which is widened. At
+///    such a `t` the ray is within gamma(8) |plane - apex| of the cell on each axis; that changes its distance from
+///    plane `i` by gamma(8) S, where S is the sum over the axes of |n| times the root's greatest |plane - apex|. (A
+///    component of a direction whose reciprocal overflows moves the ray by less than 2^-28 of that way:
+///    [`ClipPyramid::holds`].)
 ///
 /// At the root the distances are three products of differences, summed: off by gamma(4) S. So the margin starts at
 /// gamma(12) S, and the other eight of the gamma(20) below pay for the rounding of S and of the margin itself.
@@ -24,8 +25,8 @@ use hybray_geometry::{Aabb, Vec3, gamma};
 /// A midpoint's distance is the average of two: no further off than they are, plus the rounding of their sum, which is
 /// u times the result, plus `|n_axis|` times what the plane is off the true midpoint, which is half the rounding error
 /// of `lo + hi` (exactly known: Knuth's two-sum). Both are added on each level, twice over. Near a plane, where margins
-/// matter, the distances halve with the cells, so the sum over all levels stays near that of the first few; its bound is
-/// levels x ulp x the largest distance.
+/// matter, the distances halve with the cells, so the sum over all levels stays near that of the first few; its bound
+/// is levels x ulp x the largest distance.
 ///
 /// A distance computed anew is off by gamma(4) S again, which every margin already holds.
 ///

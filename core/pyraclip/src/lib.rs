@@ -21,15 +21,15 @@
 //! - **Nothing is missed.** The cliplist holds every leaf that any ray of the pyramid touches, closed faces included,
 //!   and every leaf that `f32` slab arithmetic takes a ray to touch. [`traverse`] finds exactly the hit that testing
 //!   every object would find: least distance first, then least id.
-//! - **Little is kept in vain.** A leaf in the list overlaps the pyramid, or misses it by no more than 2e-5 of its
-//!   distance and the error bound of `distances`.
+//! - **Little is kept in vain.** A leaf in the list overlaps the pyramid, or misses it by no more than the leaning of
+//!   [`ClipPyramid`] (2e-5 of its distance, up to an opening of 100 degrees) and the margins of `distances`.
 //!
 //! # Where it departs from the paper
 //!
 //! - Every decision has a margin; what lies within it is kept.
-//! - The four planes cut space into more than the paper's nine subspaces: what is behind the apex is outside several
-//!   planes that face each other, and there neither "B and G" nor "A, C, F and H" means an overlap. A fifth plane through
-//!   the apex, the sum of the four, tells whether a cell is ahead of it; only then do the bits alone decide.
+//! - The four planes cut space into more than the paper's nine subspaces: what is behind the apex is outside several,
+//!   and a wall there has vertices in A, C, F and H too. A fifth plane through the apex, the sum of the four, tells
+//!   whether a cell is ahead of it; only then do those four subspaces mean that it surrounds the pyramid.
 //! - "Three consecutive subspaces" is taken as what makes it right: all vertices are beyond one plane.
 //! - A cell that no edge test keeps and that is not wholly ahead is a case that the paper leaves out: it surrounds the
 //!   pyramid only if the axis ray meets it.
@@ -46,6 +46,7 @@ mod classify;
 mod cliplist;
 mod distances;
 mod edge;
+mod midpoint;
 mod pyramid;
 mod traverse;
 mod tree;

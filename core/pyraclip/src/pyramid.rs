@@ -4,8 +4,9 @@ use hybray_geometry::{Pyramid, Ray, RayKernel, Vec3};
 
 /// A pyramid whose four planes are leaned outward by at least [`ClipPyramid::LEAN`].
 ///
-/// The planes that an [`Pyramid`] has are cross products in `f32`, and the rays inside them are rounded too: the leaning
-/// lets the planes hold every ray that was meant to be inside. From there on, the leaned normals are taken as exact.
+/// The planes that an [`Pyramid`] has are cross products in `f32`, and the rays inside them are rounded too: the
+/// leaning lets the planes hold every ray that was meant to be inside. From there on, the leaned normals are taken as
+/// exact.
 #[derive(Clone, Copy, Debug)]
 pub struct ClipPyramid {
     pub(crate) apex: Vec3,

@@ -235,8 +235,7 @@ fn group<S: Simd>(
         if leaf.near > stop {
             break;
         }
-        let corner = |c: [f32; 3]| c.map(|x| simd.splat8(x));
-        let (near, far) = lanes.own_slab(&corner(leaf.lo), &corner(leaf.hi));
+        let (near, far) = lanes.own_slab(&simd.splat8_axes(leaf.lo), &simd.splat8_axes(leaf.hi));
         let near = near.or_greater(lanes.t_min);
         let met = (near.le(far) & near.le(farthest)).bits();
         if met == 0 {
@@ -294,7 +293,12 @@ fn leaf<S: Simd>(
                     if lane > 0 && block.id[lane] == block.id[lane - 1] {
                         break;
                     }
-                    let v = block.v.map(|vertex| vertex.map(|axis| simd.splat8(axis[lane])));
+                    let corners = block.get(lane).v;
+                    let v = [
+                        simd.splat8_axes(corners[0].to_array()),
+                        simd.splat8_axes(corners[1].to_array()),
+                        simd.splat8_axes(corners[2].to_array()),
+                    ];
                     let (t, hit) = triangle_lanes(lanes, &v);
                     keep(t, hit, block.id[lane], (start + i) * BLOCK + lane);
                 }
@@ -306,8 +310,9 @@ fn leaf<S: Simd>(
                     if lane > 0 && block.id[lane] == block.id[lane - 1] {
                         break;
                     }
-                    let centre = block.centre.map(|axis| simd.splat8(axis[lane]));
-                    let (t, hit) = sphere_lanes(lanes, &centre, simd.splat8(block.radius[lane]));
+                    let sphere = block.get(lane);
+                    let centre = simd.splat8_axes(sphere.centre.to_array());
+                    let (t, hit) = sphere_lanes(lanes, &centre, simd.splat8(sphere.radius));
                     keep(t, hit, block.id[lane], (start + i) * BLOCK + lane);
                 }
             }

@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{Tree, for_each_pyramid, trees};
-use hybray_geometry::{Candidate, Ray, RayKernel};
-use hybray_pyraclip::{ClipCell, ClipCounts, TraverseCounts, traverse};
+use common::{Object, Tree, for_each_pyramid, trees};
+use hybray_geometry::{Candidate, Pyramid, Ray, RayKernel, Sphere, Triangle, Vec3};
+use hybray_pyraclip::{ClipCell, ClipCounts, ClipPyramid, TraverseCounts, midpoint, traverse};
 
 fn check(name: &str, tree: &Tree, list: &[ClipCell<u32>], ray: &Ray, counts: &mut TraverseCounts) -> Candidate {
     let kernel = RayKernel::new(ray);
@@ -44,4 +44,28 @@ fn nearest_hits_are_those_of_brute_force() {
         assert!(hits > 100, "{name}");
         assert!(counts.visits < counts.exits && counts.exits < 3 * listed, "{name}: {counts:?}");
     }
+}
+
+/// A triangle whose nearest vertex is within rounding of the edge in which four cells meet, but in one of them only,
+/// and not in one that the ray passes through. Comparing exits as the paper does would skip that cell.
+#[test]
+fn an_object_in_the_corner_of_a_cell_beside_the_ray_is_found() {
+    let triangle = Triangle { v: [[1e-6, -1e-6, 0.0], [0.1, -0.05, 0.1], [0.1, -0.1, -0.1]].map(Vec3::from_array) };
+    // The other cells hold something that the ray does not hit.
+    let away = |x: f32, y: f32| Object::Sphere(Sphere { centre: Vec3::new(x, y, 0.5), radius: 0.01 });
+    let objects = vec![Object::Triangle(triangle), away(-0.5, -0.5), away(-0.5, 0.5), away(0.5, 0.5), away(0.5, -0.5)];
+    let tree = Tree::cut(objects, common::cube(1.0), 2, 0, midpoint);
+    let ray = Ray {
+        origin: Vec3::new(-1000.0, -1000.0, 0.0),
+        direction: Vec3::new(1.0, 1.0, 0.0),
+        t_min: 0.0,
+        t_max: f32::INFINITY,
+    };
+    let corner = |i: f32, j: f32| Vec3::new(1.0 + i * 1e-3, 1.0 - i * 1e-3, j * 1e-3);
+    let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+    let pyramid = ClipPyramid::new(&Pyramid::through(ray.origin, corners).unwrap()).unwrap();
+    let list = tree.list(&pyramid, &mut ClipCounts::default());
+    assert_eq!(tree.leaves().filter(|&l| tree.nodes[l as usize].objects.contains(&0)).count(), 1);
+    let found = check("corner", &tree, &list, &ray, &mut TraverseCounts::default());
+    assert_eq!(found.id, 0);
 }

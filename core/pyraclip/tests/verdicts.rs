@@ -188,7 +188,7 @@ fn skimming(pyramid: &ClipPyramid, inside: Vec3, outside: Vec3) -> Option<Ray> {
 fn boxes_that_are_only_just_touched_are_kept() {
     let mut r = Random(12);
     let (mut touched, mut taken) = (0, 0);
-    let (mut counts, mut nothing) = (ClipCounts::default(), ClipCounts::default());
+    let mut counts = ClipCounts::default();
     for _ in 0..4_000 {
         let Some(pyramid) = any_pyramid(&mut r).as_ref().and_then(ClipPyramid::new) else { continue };
         let normals = pyramid.normals();
@@ -215,11 +215,10 @@ fn boxes_that_are_only_just_touched_are_kept() {
                 let (entry, exit) = kernel.slab(&aabb);
                 if exactly || (entry <= exit && exit >= 0.0) {
                     let verdict = classify(&pyramid, &aabb, &mut counts);
-                    assert_ne!(verdict, Verdict::Outside, "{pyramid:?} {ray:?} {aabb:?} {exactly}");
+                    // And what is on the border is not surely inside.
+                    assert_eq!(verdict, Verdict::Partly, "{pyramid:?} {ray:?} {aabb:?} {exactly}");
                     touched += u64::from(exactly);
                     taken += u64::from(!exactly);
-                } else {
-                    let _ = classify(&pyramid, &aabb, &mut nothing);
                 }
             }
         }

@@ -64,6 +64,7 @@ const _: () = assert!(core::mem::size_of::<ConeRecord>() == 36);
 impl TriangleBlock {
     /// The triangle in `lane`.
     #[must_use]
+    #[inline(always)]
     pub fn get(&self, lane: usize) -> Triangle {
         Triangle { v: self.v.map(|p| Vec3::new(p[0][lane], p[1][lane], p[2][lane])) }
     }
@@ -82,6 +83,7 @@ impl TriangleBlock {
 impl SphereBlock {
     /// The sphere in `lane`.
     #[must_use]
+    #[inline(always)]
     pub fn get(&self, lane: usize) -> Sphere {
         let c = &self.centre;
         Sphere { centre: Vec3::new(c[0][lane], c[1][lane], c[2][lane]), radius: self.radius[lane] }

@@ -11,7 +11,6 @@ use std::io::Write;
 pub(super) fn run(args: &InfoArgs) -> Result<End> {
     let (model, import_time) = load(&args.scene, None)?;
     let bounds = framing::bounds(&model);
-    let normals = model.meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len()).sum::<usize>();
     let prepared = Prepared::new(model, &args.tree.settings())?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
@@ -29,7 +28,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
     )?;
     writeln!(
         out,
-        "primitives   {triangles} triangles ({normals} with vertex normals), {spheres} spheres, {cones} cones"
+        "primitives   {triangles} triangles ({} with vertex normals), {spheres} spheres, {cones} cones",
+        prepared.smooth
     )?;
     writeln!(out, "tables       {lights} lights, {materials} materials")?;
     let cameras: Vec<_> = prepared.cameras.iter().map(|c| format!("`{}`", c.name)).collect();
@@ -37,10 +37,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
     if let Some((lo, hi)) = bounds {
         writeln!(out, "extent       {lo:?} to {hi:?}")?;
     }
-    let mut requires = vec!["mirrors and shadows"];
-    requires.extend(scene.transmits.then_some("refraction"));
-    requires.extend((normals > 0).then_some("vertex normals"));
-    writeln!(out, "requires     {}", requires.join(", "))?;
+    writeln!(out, "requires     {}", prepared.requires().join(", "))?;
     let bytes = prepared.packed.page_bytes();
     writeln!(
         out,

@@ -58,13 +58,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     show.begin();
-    let trace_start = Instant::now();
     let traced = trace(&scene, prepared.hash, &frame, &farm, &mut |progress| {
         show.progress(progress);
         !interrupted.load(Ordering::Relaxed)
     })
     .context("the picture has no pixels, or too many: give --size, such as 640x480")?;
-    let trace_time = trace_start.elapsed();
+    let trace_time = traced.time;
     show.end();
     drop(pages);
 

@@ -23,27 +23,32 @@ struct Answer {
 struct Tracer<'a> {
     scene: Scene<'a>,
     args: &'a TraceArgs,
-    /// Internal units of a file unit.
-    scale: f32,
+    /// A file unit is 2 to this power internal units.
+    scale_log2: i32,
     stack: Stack,
     counts: Counts,
 }
 
 impl Tracer<'_> {
-    /// `t` counts in the caller's directions, whose length is kept: only positions are scaled.
+    /// `t` counts in the caller's directions, whose length is kept but for a power of two that brings it near the
+    /// scene's: squares of very long or short ones would leave the range of `f32`.
     fn answer(&mut self, [ox, oy, oz, dx, dy, dz, t_min, t_max]: [f32; 8]) -> Option<Answer> {
+        let direction = Vec3::new(dx, dy, dz);
+        let exponent = libm::ilogbf(direction.abs().max_element());
+        let shrink = |x: f32, by: i32| libm::ldexpf(x, by);
+        let steps = exponent + self.scale_log2;
         let ray = Ray {
-            origin: Vec3::new(ox, oy, oz) * self.scale,
-            direction: Vec3::new(dx, dy, dz) * self.scale,
-            t_min,
-            t_max,
+            origin: Vec3::new(ox, oy, oz) * libm::ldexpf(1.0, self.scale_log2),
+            direction: Vec3::new(shrink(dx, -exponent), shrink(dy, -exponent), shrink(dz, -exponent)),
+            t_min: shrink(t_min, steps),
+            t_max: shrink(t_max, steps),
         };
         let hit = nearest(self.args.kernels.kernels(), &self.scene.resident, &ray, &mut self.stack, &mut self.counts);
         if !hit.candidate.is_hit() {
             return None;
         }
         let point = surface_point(&self.scene.resident.pages[hit.page as usize], &ray, &hit);
-        Some(Answer { t: hit.candidate.t, primitive: hit.candidate.id, uv: point.uv, normal: point.normal })
+        Some(Answer { t: shrink(hit.candidate.t, -steps), primitive: hit.candidate.id, uv: point.uv, normal: point.normal })
     }
 }
 
@@ -54,7 +59,7 @@ pub(super) fn run(args: &TraceArgs) -> Result<End> {
     let mut tracer = Tracer {
         scene: prepared.scene(&pages),
         args,
-        scale: 2f32.powi(prepared.packed.scale_log2),
+        scale_log2: prepared.packed.scale_log2,
         stack: Stack::new(),
         counts: Counts::default(),
     };

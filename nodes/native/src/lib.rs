@@ -11,7 +11,7 @@ use hybray_scheduler::{
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Where tiles are given out (POV||Ray, section 2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,6 +43,8 @@ pub const NODES_MAX: Peer = 1024;
 pub struct Traced {
     /// How it ended.
     pub outcome: Outcome,
+    /// From the picture's beginning to the last tile.
+    pub time: Duration,
     /// Mean radiance of each pixel, row by row from the top.
     pub radiance: Vec<[f32; 3]>,
     /// Hash of the accumulated picture.
@@ -76,8 +78,6 @@ pub fn trace(
         DispatcherAt::Host => HOST,
         DispatcherAt::Node => 1,
     };
-    let start = Instant::now();
-    let clock = || u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
     let walks = Mutex::new(hybray_bintree::walk::Counts::default());
 
     let mut sums = vec![[0; 3]; map.width() as usize * map.height() as usize];
@@ -86,9 +86,11 @@ pub fn trace(
     let mut reports = vec![NodeReport::default(); peers];
     let mut master = Master::new(*frame, film, &mut reports, scene_hash, dispatcher_at);
 
+    let start = Instant::now();
+    let clock = || u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
     let mut ends = links(nodes + 1).into_iter();
     let mut host_link = ends.next()?;
-    let outcome = std::thread::scope(|threads| {
+    let (outcome, time) = std::thread::scope(|threads| {
         for (peer, mut link) in (1..).zip(ends) {
             let walks = &walks;
             threads.spawn(move || {
@@ -108,11 +110,12 @@ pub fn trace(
         let dispatcher = (dispatcher_at == HOST).then(|| Dispatcher::new(&mut states, farm.options));
         let outcome = run_master(&mut master, dispatcher, &mut host_link, &mut { clock }, watch);
         drop(host_link);
-        outcome
+        (outcome, start.elapsed())
     });
     let film = master.film();
     Some(Traced {
         outcome,
+        time,
         radiance: (0..film.sums().len()).map(|pixel| film.radiance(pixel)).collect(),
         film: film.hash(),
         progress: master.progress(),

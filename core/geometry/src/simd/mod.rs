@@ -97,6 +97,18 @@ pub trait Simd: Copy {
     fn load8(self, a: &[f32; 8]) -> Self::F8 {
         self.splat8(0.0).load_like(a)
     }
+    // Closures, such as those that `map` takes, are not always inlined into code for the instruction set, and then each
+    // load is a call: these spell the three axes out.
+    /// Three axes of four lanes from memory.
+    #[inline(always)]
+    fn load4_axes(self, a: &[[f32; 4]; 3]) -> [Self::F4; 3] {
+        [self.load4(&a[0]), self.load4(&a[1]), self.load4(&a[2])]
+    }
+    /// A point in every one of eight lanes.
+    #[inline(always)]
+    fn splat8_axes(self, a: [f32; 3]) -> [Self::F8; 3] {
+        [self.splat8(a[0]), self.splat8(a[1]), self.splat8(a[2])]
+    }
 }
 
 /// A computation written over any [`Simd`]. Mark `run`, and what it calls, `#[inline(always)]`.

@@ -68,7 +68,8 @@ pub fn scattered(seed: u64, count: usize) -> Vec<Object> {
     (0..count).map(object).collect()
 }
 
-/// Triangles with corners on a coarse grid, many in planes of the tree, and spheres that touch such planes. Many coincide.
+/// Triangles with corners on a coarse grid, many in planes of the tree, and spheres that touch such planes. Many
+/// coincide.
 pub fn on_the_grid(seed: u64, count: usize) -> Vec<Object> {
     let mut r = Random(seed);
     let object = |i: usize| {
@@ -101,6 +102,11 @@ pub struct Tree {
 impl Tree {
     /// The paper's limits: 12 objects a cell, some depth. `plane` chooses where a cell is cut.
     pub fn new(objects: Vec<Object>, root: Aabb, depth: usize, plane: impl Fn(f32, f32) -> f32) -> Self {
+        Self::cut(objects, root, depth, 12, plane)
+    }
+
+    /// Cuts across the longest axis until a cell is `depth` levels down or holds no more than `few`.
+    pub fn cut(objects: Vec<Object>, root: Aabb, depth: usize, few: usize, plane: impl Fn(f32, f32) -> f32) -> Self {
         assert!(objects.iter().all(|o| root.contains(&o.aabb())));
         let all = (0..objects.len() as u32).collect();
         let mut nodes = vec![Node { aabb: root, split: None, objects: all }];
@@ -110,7 +116,7 @@ impl Tree {
             let size = aabb.hi - aabb.lo;
             let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
             let plane = plane(aabb.lo[axis], aabb.hi[axis]);
-            if nodes[at].objects.len() <= 12 || level == depth {
+            if nodes[at].objects.len() <= few || level == depth {
                 continue;
             }
             if !(aabb.lo[axis] < plane && plane < aabb.hi[axis]) {

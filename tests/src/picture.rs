@@ -1,0 +1,74 @@
+//! Scenes by name, and the pictures that farms make of them.
+
+use hybray::build;
+use hybray::model::{Model, Settings};
+use hybray::prepare::Prepared;
+use hybray::{framing, import};
+use hybray_geometry::simd::Kernels;
+use hybray_native::{Farm, trace};
+use hybray_scheduler::Outcome;
+use hybray_wire::Counts;
+
+/// What a picture came to: all of it a function of the scene and the settings that change pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Hash of the film.
+    pub film: u64,
+    /// Rays, hits and contributions of all nodes together.
+    pub counts: Counts,
+    /// Tiles that nodes traced: each of the picture's once.
+    pub tiles: u32,
+}
+
+/// A built-in scene or a file, with camera and lights, as the program has it.
+///
+/// # Panics
+/// If there is no such scene.
+#[must_use]
+pub fn scene(name: &str) -> Model {
+    let mut model = import::load(name).unwrap_or_else(|e| panic!("{e}"));
+    framing::complete_with_up(&mut model, import::up_axis(name));
+    model
+}
+
+/// The kernels that `HYBRAY_KERNELS` asks for, as the program has it: the best ones, or the portable ones.
+#[must_use]
+pub fn kernels() -> Kernels {
+    match std::env::var("HYBRAY_KERNELS").as_deref() {
+        Ok("portable") => Kernels::Portable,
+        _ => Kernels::detect(),
+    }
+}
+
+/// Draws `prepared`, seen by its first camera, on `farm`. `what` is named when that fails.
+///
+/// # Panics
+/// If the picture is not finished, or nodes sent anything that made no sense.
+#[must_use]
+pub fn drawn(prepared: &Prepared, wanted: &Settings, farm: &Farm, what: &str) -> Picture {
+    let pages = prepared.packed.open().unwrap_or_else(|e| panic!("{what}: {e}"));
+    let frame = prepared.frame(&prepared.cameras[0], wanted);
+    let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, farm, &mut |_| true)
+        .unwrap_or_else(|| panic!("{what}: no picture"));
+    assert_eq!((traced.outcome, traced.refused_frames), (Outcome::Finished, 0), "{what}");
+    let mut counts = Counts::default();
+    traced.nodes.iter().for_each(|node| counts += node.counts);
+    let tiles = traced.nodes.iter().map(|node| node.tiles).sum();
+    assert_eq!(tiles, traced.progress.tiles, "{what}: tiles traced twice, or not at all");
+    let primary = u64::from(frame.width) * u64::from(frame.height) * u64::from(frame.samples);
+    assert_eq!(counts.primary, primary, "{what}");
+    Picture { film: traced.film, counts, tiles }
+}
+
+/// `model` built into pages.
+impl Picture {
+    /// Builds `model` with `settings` and draws it.
+    ///
+    /// # Panics
+    /// See [`drawn`].
+    #[must_use]
+    pub fn of(model: Model, settings: &build::Settings, wanted: &Settings, farm: &Farm, what: &str) -> Self {
+        let prepared = Prepared::new(model, settings).unwrap_or_else(|e| panic!("{what}: {e}"));
+        drawn(&prepared, wanted, farm, what)
+    }
+}
