@@ -155,7 +155,7 @@ impl Prepared {
             height,
             samples: wanted.spp.or(own.spp).unwrap_or(SAMPLES).clamp(1, u32::from(u16::MAX)) as u16,
             depth_max: wanted.depth.or(own.depth).unwrap_or(DEPTH).clamp(1, hybray_scheduler::DEPTH_MAX as u32) as u8,
-            filter: filter.unwrap_or(Filter::Gaussian) as u8,
+            filter: filter.unwrap_or(Filter::Box) as u8,
             seed: wanted.seed.or(own.seed).unwrap_or(0),
             weight_cutoff: wanted.cutoff.or(own.cutoff).unwrap_or(CUTOFF),
             step_log2: Step::log2_for(self.exposure(wanted)),

@@ -1,9 +1,12 @@
-//! What the whole-system tests share: random numbers from a seed, scenes that are awkward, brute force, and pictures.
+//! What the whole-system tests share: random numbers from a seed, scenes that are awkward, brute force, rays and
+//! pictures.
 #![forbid(unsafe_code)]
 
 mod picture;
+mod rays;
 
 pub use picture::{Picture, drawn, kernels, scene};
+pub use rays::{camera_rays, close_rays, random_ray, rays_at};
 
 use hybray::build::Source;
 use hybray::model::{Mesh, Model, NamedMaterial, Sphere};
@@ -127,17 +130,4 @@ pub fn degenerate(count: usize) -> Model {
         .collect();
     let spheres = vec![Sphere { centre: [0.5; 3], radius: 0.25, material: 0 }; count / 2];
     model(triangles, spheres)
-}
-
-/// A ray through the box around -1 to 1; every fourth on a coarse grid, along an axis or a diagonal.
-pub fn random_ray(random: &mut Random) -> Ray {
-    let (mut origin, mut direction) = (random.vec() * 2.0, random.vec() - random.vec());
-    if random.below(4) == 0 {
-        origin = (origin * 4.0).round() * 0.25;
-        direction = (direction * 1.4).round();
-    }
-    if direction == Vec3::ZERO {
-        direction = Vec3::Z;
-    }
-    Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
 }

@@ -60,7 +60,6 @@ pub fn drawn(prepared: &Prepared, wanted: &Settings, farm: &Farm, what: &str) ->
     Picture { film: traced.film, counts, tiles }
 }
 
-/// `model` built into pages.
 impl Picture {
     /// Builds `model` with `settings` and draws it.
     ///

@@ -1,6 +1,7 @@
 //! Builds, images, benchmarks and the one gate: one verb of `cargo xtask`, one file.
 #![forbid(unsafe_code)]
 
+mod bench;
 mod ci;
 mod gate;
 mod nostd;
@@ -30,6 +31,9 @@ enum Verb {
     Tidy,
     /// Build the core crates for a machine without an operating system
     Nostd,
+    /// Measure again what the project says of its speed and size
+    #[command(subcommand)]
+    Bench(bench::Bench),
 }
 
 fn main() -> anyhow::Result<ExitCode> {
@@ -38,5 +42,6 @@ fn main() -> anyhow::Result<ExitCode> {
         Verb::Test => test::run(),
         Verb::Tidy => tidy::run(),
         Verb::Nostd => nostd::run(),
+        Verb::Bench(bench) => bench::run(&bench),
     }
 }

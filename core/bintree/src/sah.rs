@@ -1,15 +1,15 @@
 //! Top-down binned surface-area heuristic (Wald, *On fast construction of SAH-based bounding volume hierarchies*, 2007).
 
 use crate::BINARY_DEPTH_MAX;
-use crate::binary::{BinaryNode, Item, Pending, bounds};
+use crate::binary::{BinaryNode, Item, Pending};
 use hybray_geometry::{Aabb, Vec3};
 use hybray_scene::BLOCK;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Ranges of at most this many items are leaves without more ado: 1 to build to the end, more to leave the rest of
-    /// the work to another thread.
+    /// Ranges of at most this many items are leaves without more ado: a block or less to build to the end, more to leave
+    /// the rest of the work to another thread.
     pub stop_at: u32,
     /// Most items of a leaf that the heuristic may make; at most 64.
     pub leaf_max: u32,
@@ -58,13 +58,13 @@ pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) 
         // Down the first children, leaving the second ones on the stack: one entry a level.
         loop {
             let range = &mut items[part.first as usize..][..part.count as usize];
-            let aabb = bounds(range);
+            let (boxes, centroids) = extents(range);
             let here = used;
-            nodes[here] = BinaryNode { aabb, first: part.first, count: part.count, second: 0 };
+            nodes[here] = BinaryNode { aabb: boxes.aabb(), first: part.first, count: part.count, second: 0 };
             used += 1;
             // Each part that waits will take a node.
             let room = used + waiting + 2 <= nodes.len();
-            let Some(left) = room.then(|| split(range, &aabb, part.depth, settings)).flatten() else {
+            let Some(left) = room.then(|| split(range, &boxes, &centroids, part.depth, settings)).flatten() else {
                 range.sort_unstable_by_key(|item| (item.kind, item.id));
                 break;
             };
@@ -82,13 +82,54 @@ pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) 
     used
 }
 
+/// A box as two quadruples, whose unions the compiler makes of two instructions; the fourth value means nothing.
+#[derive(Clone, Copy)]
+struct Quad {
+    lo: [f32; 4],
+    hi: [f32; 4],
+}
+
+impl Quad {
+    const EMPTY: Self = Self { lo: [f32::INFINITY; 4], hi: [f32::NEG_INFINITY; 4] };
+
+    #[inline(always)]
+    fn of(lo: Vec3, hi: Vec3) -> Self {
+        Self { lo: [lo.x, lo.y, lo.z, 0.0], hi: [hi.x, hi.y, hi.z, 0.0] }
+    }
+
+    #[inline(always)]
+    fn union(&self, b: &Self) -> Self {
+        Self {
+            lo: core::array::from_fn(|i| if b.lo[i] < self.lo[i] { b.lo[i] } else { self.lo[i] }),
+            hi: core::array::from_fn(|i| if b.hi[i] > self.hi[i] { b.hi[i] } else { self.hi[i] }),
+        }
+    }
+
+    fn aabb(&self) -> Aabb {
+        let corner = |c: &[f32; 4]| Vec3::new(c[0], c[1], c[2]);
+        Aabb { lo: corner(&self.lo), hi: corner(&self.hi) }
+    }
+
+    fn half_area(&self) -> f32 {
+        self.aabb().half_area()
+    }
+}
+
+/// The box around `items`, and the box around their centroids.
+fn extents(items: &[Item]) -> (Quad, Quad) {
+    items.iter().fold((Quad::EMPTY, Quad::EMPTY), |(boxes, centroids), item| {
+        let c = centroid(item);
+        (boxes.union(&Quad::of(item.lo, item.hi)), centroids.union(&Quad::of(c, c)))
+    })
+}
+
 #[derive(Clone, Copy)]
 struct Bin {
-    aabb: Aabb,
+    aabb: Quad,
     count: u32,
 }
 
-const EMPTY: Bin = Bin { aabb: Aabb::EMPTY, count: 0 };
+const EMPTY: Bin = Bin { aabb: Quad::EMPTY, count: 0 };
 
 struct Plane {
     axis: usize,
@@ -104,7 +145,8 @@ struct Binning {
 }
 
 impl Binning {
-    fn new(centroids: &Aabb) -> Self {
+    fn new(centroids: &Quad) -> Self {
+        let centroids = centroids.aabb();
         let extent = centroids.hi - centroids.lo;
         let scale = |e: f32| {
             let s = BINS as f32 * (1.0 - 1e-6) / e;
@@ -116,7 +158,7 @@ impl Binning {
     #[inline(always)]
     fn bins(&self, item: &Item) -> [usize; 3] {
         let at = (centroid(item) - self.lo) * self.scale;
-        [at.x, at.y, at.z].map(|x| (x as usize).min(BINS - 1))
+        [at.x, at.y, at.z].map(|x| (x as u32 as usize).min(BINS - 1))
     }
 }
 
@@ -130,20 +172,18 @@ fn blocks(count: u32) -> f32 {
 }
 
 /// Reorders `items` so that the first child's come first, and returns how many those are; `None` for a leaf.
-fn split(items: &mut [Item], aabb: &Aabb, depth: u32, settings: &Settings) -> Option<usize> {
+fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings: &Settings) -> Option<usize> {
     let count = items.len() as u32;
-    if count <= settings.stop_at.max(1) {
+    // Fewer than a block cost as much as a block: they are divided only where that would leave most of them out, and
+    // then the boxes above them are small already.
+    if count <= settings.stop_at.max(BLOCK as u32) {
         return None;
     }
     // Halving ends in time from any depth that leaves as many levels as the count has bits.
     if depth + (32 - count.leading_zeros()) >= BINARY_DEPTH_MAX {
         return Some(items.len() / 2);
     }
-    let centroids = items.iter().fold(Aabb::EMPTY, |b, i| {
-        let c = centroid(i);
-        b.union(&Aabb { lo: c, hi: c })
-    });
-    let binning = Binning::new(&centroids);
+    let binning = Binning::new(centroids);
     let plane = best_plane(items, &binning);
     let leaf_cost = blocks(count);
     let area = aabb.half_area();
@@ -163,7 +203,7 @@ fn split(items: &mut [Item], aabb: &Aabb, depth: u32, settings: &Settings) -> Op
 fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
     let mut bins = [[EMPTY; BINS]; 3];
     for item in items {
-        let aabb = item.aabb();
+        let aabb = Quad::of(item.lo, item.hi);
         for (axis, bin) in binning.bins(item).into_iter().enumerate() {
             let bin = &mut bins[axis][bin];
             bin.aabb = bin.aabb.union(&aabb);

@@ -132,8 +132,10 @@ impl Triangle {
         let x = most(e.xy.map(|p| get(p[0])));
         let y = most(e.xy.map(|p| get(p[1])));
         let z = most(e.z.map(get));
-        let (dz, dx, dy) = (gamma(3) * z, gamma(5) * (x + z), gamma(5) * (y + z));
-        let de = 2.0 * (gamma(2) * x * y + dy * x + dx * y);
+        // The shear acts on depths as lengths, whatever the length of the direction.
+        let depth = z * ray.direction[ray.axes[2]].abs();
+        let (dz, dx, dy) = (gamma(3) * z, gamma(8) * (x + depth), gamma(8) * (y + depth));
+        let de = 2.0 * (gamma(2) * x * y + dy * x + dx * y + dx * dy);
         let edge = most([u, v, w]);
 
         SurfacePoint {

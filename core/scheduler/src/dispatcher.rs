@@ -4,13 +4,14 @@
 //! has its next run before it ends the last. T, the nodes' rates and the least useful run are learned on the way.
 
 use crate::chunk::{Shares, chunk};
+use crate::master::NO_MORE;
 use crate::send;
-use hybray_link::{Link, Peer};
+use hybray_link::{HOST, Link, Peer};
 use hybray_wire::Message;
 
 /// Runs that a node has at a time: one in work, and the next.
 const AHEAD: usize = 2;
-/// Tiles that wait to be given out again.
+/// Runs that wait to be given out again.
 const AGAIN_MAX: usize = 64;
 /// T before anything is known (Pandzic and Magnenat-Thalmann, by way of POV||Ray's conclusions).
 const SPREAD_START: f32 = 2.5;
@@ -49,7 +50,7 @@ pub struct NodeState {
     tiles_done: u64,
     nanoseconds: u64,
     /// When its first run was sent, to learn what a message costs.
-    first_sent_at: u64,
+    first_sent_at: Option<u64>,
     measured: bool,
 }
 
@@ -62,6 +63,8 @@ pub struct Dispatcher<'m> {
     /// First tile that was never given out.
     next: u32,
     again: heapless::Deque<Run, AGAIN_MAX>,
+    /// More tiles to be given out again are on their way here.
+    gathering: bool,
     /// Least and greatest cost of a tile in any run, nanoseconds.
     cheapest: u64,
     dearest: u64,
@@ -82,6 +85,7 @@ impl<'m> Dispatcher<'m> {
             tiles: 0,
             next: 0,
             again: heapless::Deque::new(),
+            gathering: false,
             cheapest: u64::MAX,
             dearest: 0,
             runs_done: 0,
@@ -90,10 +94,10 @@ impl<'m> Dispatcher<'m> {
         }
     }
 
-    /// Takes in a message; those for other machines are passed over.
+    /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
     pub fn handle(&mut self, from: Peer, message: &Message, now: u64) {
         match *message {
-            Message::Begin(frame) => {
+            Message::Begin(frame) if from == HOST => {
                 self.tiles = hybray_wire::TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
                 self.next = 0;
             }
@@ -103,14 +107,7 @@ impl<'m> Dispatcher<'m> {
                 }
             }
             Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
-            Message::Again { tile, epoch } => {
-                match self.again.back_mut() {
-                    Some(run) if run.first + run.count == tile && run.epoch == epoch => run.count += 1,
-                    // What does not fit stays unfinished, and the master names it when it looks again.
-                    _ => drop(self.again.push_back(Run { first: tile, count: 1, epoch })),
-                }
-                self.nodes.iter_mut().for_each(|node| node.told = false);
-            }
+            Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
             _ => {}
         }
     }
@@ -126,6 +123,31 @@ impl<'m> Dispatcher<'m> {
         }
     }
 
+    /// A tile that the film wants again, or the end of their list. The picture is not idle in between: each node would report
+    /// before all is done, and nobody could tell that report from the next.
+    fn again(&mut self, tile: u32, epoch: u16) {
+        self.nodes.iter_mut().for_each(|node| node.told = false);
+        if tile == NO_MORE {
+            self.gathering = false;
+        }
+        if tile >= self.tiles {
+            return;
+        }
+        self.gathering = true;
+        let adjacent = |run: &Run| run.first + run.count == tile && run.epoch == epoch;
+        if let Some(run) = self.again.back_mut().filter(|run| adjacent(run)) {
+            run.count += 1;
+        } else if self.again.push_back(Run { first: tile, count: 1, epoch }).is_err()
+            && let Some(run) = self.again.back_mut()
+        {
+            // Where there is no room, the tiles in between are traced for nothing: the film has them and takes no more.
+            let end = (run.first + run.count).max(tile + 1);
+            run.first = run.first.min(tile);
+            run.count = end - run.first;
+            run.epoch = run.epoch.max(epoch);
+        }
+    }
+
     fn done(&mut self, from: Peer, first: u32, count: u32, nanoseconds: u64, now: u64) {
         let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
         let Some(&run) = node.runs.front() else { return };
@@ -137,7 +159,7 @@ impl<'m> Dispatcher<'m> {
         node.nanoseconds += nanoseconds;
         if !node.measured {
             node.measured = true;
-            let round_trip = now.saturating_sub(node.first_sent_at);
+            let round_trip = now.saturating_sub(node.first_sent_at.unwrap_or(now));
             self.overhead = self.overhead.min(round_trip.saturating_sub(nanoseconds));
         }
         self.runs_done += 1;
@@ -188,6 +210,7 @@ impl<'m> Dispatcher<'m> {
         self.tiles > 0
             && self.next == self.tiles
             && self.again.is_empty()
+            && !self.gathering
             && self.nodes.iter().all(|node| node.runs.is_empty())
     }
 
@@ -269,9 +292,7 @@ impl<'m> Dispatcher<'m> {
                 let message = Message::Tiles { first: run.first, count: run.count, epoch: run.epoch };
                 if send(link, peer as Peer, &message) {
                     let node = &mut self.nodes[peer];
-                    if node.first_sent_at == 0 {
-                        node.first_sent_at = now;
-                    }
+                    node.first_sent_at.get_or_insert(now);
                     let _ = node.runs.push_back(run);
                     self.asked = true;
                 } else {

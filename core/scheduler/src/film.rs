@@ -182,8 +182,11 @@ impl<'m> Film<'m> {
         Ok(state.finished)
     }
 
-    /// Empties a tile that is not finished and debits its primaries, under `epoch`.
+    /// Empties a tile and debits its primaries, under `epoch`. A finished tile, or none of this picture's, stays as it is.
     pub fn open(&mut self, tile: u32, epoch: u16) {
+        if self.tiles.get(tile as usize).is_none_or(|t| t.finished) {
+            return;
+        }
         let (seed, samples) = (self.seed, u32::from(self.samples));
         let ids = self.pixels(tile).flat_map(|pixel| (0..samples).map(move |s| id::primary_id(seed, pixel, s)));
         let balance = Balance::debit(ids);

@@ -5,6 +5,9 @@ use crate::send;
 use hybray_link::{HOST, Link, Peer};
 use hybray_wire::{Counts, Frame, Message, VERSION, View};
 
+/// In place of a tile to be traced again: these were all.
+pub(crate) const NO_MORE: u32 = u32::MAX;
+
 /// How far a picture is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
@@ -66,7 +69,7 @@ pub struct Master<'m> {
     /// Peers up to this one have been told to stop; and whether to.
     stopping: Option<usize>,
     outcome: Option<Outcome>,
-    /// Tiles from this one on are still to be looked at in this round.
+    /// Tiles from this one on are still to be asked for again in this round; [`NO_MORE`] has still to be said.
     looking: Option<u32>,
     asked_again: bool,
     refused_frames: u64,
@@ -120,7 +123,9 @@ impl<'m> Master<'m> {
     /// How it ended, once everybody has been told.
     #[must_use]
     pub fn outcome(&self) -> Option<Outcome> {
-        self.outcome.filter(|_| self.stopping == Some(self.nodes.len()))
+        let outcome = self.outcome.filter(|_| self.stopping == Some(self.nodes.len()))?;
+        // What was on its way when the last of them was lost may have been all that was missing.
+        Some(if outcome == Outcome::Abandoned && self.film.is_finished() { Outcome::Finished } else { outcome })
     }
 
     /// Ends the picture as it is.
@@ -169,6 +174,8 @@ impl<'m> Master<'m> {
         if let Some(node) = self.nodes.get_mut(usize::from(peer)) {
             node.lost = true;
         }
+        // What is missing from now on may be missing for this reason: it is no second fault of the ledger.
+        self.asked_again = false;
         let all = self.nodes.iter().skip(1).all(|n| n.lost);
         if all || (peer == self.dispatcher && peer != HOST) {
             self.end(Outcome::Abandoned);
@@ -177,13 +184,15 @@ impl<'m> Master<'m> {
     }
 
     /// When every node that is left has reported, nothing is on the way any more: a report comes after all
-    /// contributions of its sender.
+    /// contributions of its sender. A node whose first word has not arrived is waited for if something is missing: the
+    /// dispatcher may have heard of it long ago.
     fn look(&mut self) {
-        let all = self.nodes.iter().skip(1).all(|n| n.reported || n.lost || !n.greeted);
+        let whole = self.film.is_finished();
+        let all = self.nodes.iter().skip(1).all(|n| n.reported || n.lost || (whole && !n.greeted));
         if !all || self.outcome.is_some() || self.looking.is_some() {
             return;
         }
-        if self.film.is_finished() {
+        if whole {
             self.end(Outcome::Finished);
             return;
         }
@@ -214,7 +223,11 @@ impl<'m> Master<'m> {
             if !send(link, self.dispatcher, &Message::Again { tile, epoch }) {
                 break;
             }
-            self.looking = (tile + 1..self.film.map().len()).find(|&next| !self.film.tile_is_finished(next));
+            let unfinished = |next: &u32| !self.film.tile_is_finished(*next);
+            self.looking = match tile {
+                NO_MORE => None,
+                _ => Some((tile + 1..self.film.map().len()).find(unfinished).unwrap_or(NO_MORE)),
+            };
         }
         if let Some(from) = self.stopping {
             let mut next = from;

@@ -383,7 +383,10 @@ impl<'m, 's> Node<'m, 's> {
                 sent |= self.greeted[i];
             }
         }
-        sent |= self.send_tiles(link);
+        // The host hears who it is before it hears anything else: a stranger's contributions must not come first.
+        if self.greeted[0] {
+            sent |= self.send_tiles(link);
+        }
         while let Some(run) = self.done.front() {
             let done = Message::Done { first: run.first, count: run.count, nanoseconds: run.nanoseconds };
             if !send(link, self.dispatcher, &done) {
