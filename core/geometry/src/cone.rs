@@ -120,6 +120,7 @@ impl Cone {
             t,
             t_error: gamma(4) * t.abs(),
             position,
+            test_error: gamma(4) * self.aabb().magnitude(),
             error: position.abs() * gamma(2) + Vec3::splat(gamma(1) * (self.base_radius + self.apex_radius)),
             normal,
             uv: [0.0; 2],

@@ -46,6 +46,10 @@ pub struct SurfacePoint {
     pub position: Vec3,
     /// Bound on the absolute error of `position` on each axis.
     pub error: Vec3,
+    /// Bound on how far from the primitive a ray that starts at `position` may still be found to meet it: the error
+    /// of the test itself, which is relative to the primitive's size. Never 0: a position may be exact, as on a plane
+    /// through the origin, and a ray from there still meets the plane at `t` = 0.
+    pub test_error: f32,
     /// Unit normal of the primitive: counterclockwise side of a triangle, outside of a sphere or cone.
     pub normal: Vec3,
     /// Weights of a triangle's second and third vertex; 0 for other primitives.

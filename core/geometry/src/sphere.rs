@@ -79,6 +79,7 @@ impl Sphere {
             t,
             t_error: moved / libm::sqrtf(a) + gamma(6) * t.abs(),
             position: self.centre + along,
+            test_error: gamma(12) * self.radius,
             error: along.abs() * gamma(6) + self.centre.abs() * gamma(2),
             normal,
             uv: [0.0; 2],

@@ -138,10 +138,14 @@ impl Triangle {
         let de = 2.0 * (gamma(2) * x * y + dy * x + dx * y + dx * dy);
         let edge = most([u, v, w]);
 
+        let position = terms[0] + terms[1] + terms[2];
+        let extent = self.v.iter().fold(0.0, |m: f32, &v| m.max((v - position).abs().max_element()));
+
         SurfacePoint {
             t,
+            test_error: gamma(10) * extent,
             t_error: 3.0 * (gamma(3) * edge * z + de * z + dz * edge) * inverse_det.abs(),
-            position: terms[0] + terms[1] + terms[2],
+            position,
             error: (terms[0].abs() + terms[1].abs() + terms[2].abs()) * gamma(7),
             normal: self.normal(),
             uv: [b[1], b[2]],

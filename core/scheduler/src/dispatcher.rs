@@ -13,12 +13,13 @@ use hybray_wire::Message;
 const AHEAD: usize = 2;
 /// Runs that wait to be given out again.
 const AGAIN_MAX: usize = 64;
-/// T before anything is known (Pandzic and Magnenat-Thalmann, by way of POV||Ray's conclusions).
+/// T before anything is known, and the least that is learned (Pandzic and Magnenat-Thalmann, by way of POV||Ray's
+/// conclusions): what was even so far may not be so further down.
 const SPREAD_START: f32 = 2.5;
 /// What a learned T may be.
-const SPREAD_RANGE: (f32, f32) = (1.0, 8.0);
+const SPREAD_RANGE: (f32, f32) = (2.5, 16.0);
 /// A run should take this many times as long as its messages.
-const OVERHEAD_FACTOR: u64 = 8;
+const OVERHEAD_FACTOR: u64 = 2;
 
 /// What may be chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -229,13 +230,24 @@ impl<'m> Dispatcher<'m> {
         if count > 0.0 && known(&node) { rate(node) * count / sum } else { 1.0 }
     }
 
-    /// Whether the last tiles are better left to others: this node is so much slower than the mean that those who are
-    /// at work would be through with them first.
-    fn too_slow_for_the_end(&self, peer: usize) -> bool {
-        let at_work = self.nodes.iter().filter(|n| n.here && !n.runs.is_empty()).count();
-        let left = self.tiles - self.next;
-        let rate = self.relative_rate(peer);
-        at_work > 0 && self.nodes[peer].runs.is_empty() && rate * (left as f32) < at_work as f32 * 0.5 && rate < 0.5
+    /// Whether what is left is better left to others: this node has work, or is slow, and those who are at work would be
+    /// through with it first.
+    fn ends_too_late(&self, peer: usize) -> bool {
+        let in_hand = |n: &NodeState| n.runs.iter().map(|run| run.count).sum::<u32>() as f32;
+        let (mut tiles, mut rates) = ((self.tiles - self.next) as f32, 0.0);
+        for other in (0..self.nodes.len()).filter(|&other| other != peer) {
+            if self.nodes[other].here && !self.nodes[other].runs.is_empty() {
+                tiles += in_hand(&self.nodes[other]);
+                rates += self.relative_rate(other);
+            }
+        }
+        if rates == 0.0 {
+            return false;
+        }
+        let (node, rate) = (&self.nodes[peer], self.relative_rate(peer));
+        let mine = (in_hand(node) + self.atomic().min(self.tiles - self.next) as f32) / rate;
+        let others = tiles / rates;
+        (rate < 0.5 || !node.runs.is_empty()) && mine > others
     }
 
     /// The next run for a node: what others lost or the film asks for again first.
@@ -246,17 +258,26 @@ impl<'m> Dispatcher<'m> {
         if let Some(run) = self.nodes.iter_mut().filter(|n| n.lost).find_map(|n| n.runs.pop_front()) {
             return Some(run);
         }
-        if self.next == self.tiles || self.too_slow_for_the_end(peer) {
+        if self.next == self.tiles || self.ends_too_late(peer) {
             return None;
         }
-        let shares = Shares {
-            tiles: self.tiles - self.next,
-            nodes: self.sharing(),
-            spread: self.spread(),
-            relative_rate: self.relative_rate(peer),
-            atomic: self.atomic(),
+        let left = self.tiles - self.next;
+        let rate = self.relative_rate(peer);
+        // What is least worth a message is a time: a slow node needs fewer tiles for it.
+        let atomic = if rate < 0.5 { ((self.atomic() as f32 * rate) as u32).max(1) } else { self.atomic() };
+        let mut count = if self.nodes[peer].runs.front().is_some_and(|run| run.count > atomic) {
+            atomic.min(left)
+        } else {
+            chunk(&Shares {
+                tiles: left,
+                nodes: self.sharing(),
+                spread: self.spread(),
+                relative_rate: rate.min(1.0),
+                atomic,
+            })
+            // What a node can do is not known before it has done something, and only as far as it has.
+            .min((self.nodes[peer].tiles_done.saturating_mul(2).min(u64::from(left)) as u32).max(atomic).min(left))
         };
-        let mut count = chunk(&shares);
         // What is left after this run begins at a square, unless it would be nothing.
         let end = (self.next + count).next_multiple_of(4).min(self.tiles);
         if count >= 4 {

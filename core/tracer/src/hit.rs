@@ -81,14 +81,14 @@ pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint 
 
 /// What shading sees of `hit`.
 ///
-/// The error given to shading is that of the position, and as much again with a rounding of the coordinates for the
-/// test that a ray starting there will be put to.
+/// The error given to shading is that of the position, and on every axis that of the test which a ray starting there will
+/// be put to.
 #[must_use]
 pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
     let point = surface_point(page, &ray.ray(), hit);
     let flat = Surface {
         position: point.position,
-        error: point.error * 2.0 + point.position.abs() * gamma(4),
+        error: point.error + Vec3::splat(point.test_error + gamma(2) * point.position.abs().max_element()),
         geometric_normal: point.normal,
         shading_normal: point.normal,
         shadow_offset: Vec3::ZERO,

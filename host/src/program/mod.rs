@@ -14,6 +14,7 @@ mod trace;
 use anyhow::{Context, Result, anyhow};
 use args::{Cli, SceneArgs, Verb};
 use clap::{CommandFactory, Parser};
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -36,10 +37,7 @@ pub fn main() -> ExitCode {
         Verb::Trace(args) => trace::run(&args),
         Verb::Convert(args) => convert::run(&args),
         Verb::Scenes => info::list_builtin(),
-        Verb::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "hybray", &mut std::io::stdout());
-            Ok(End::Done)
-        }
+        Verb::Completions { shell } => completions(shell),
         Verb::Man => man(),
     };
     match end {
@@ -47,19 +45,44 @@ pub fn main() -> ExitCode {
         Ok(End::Interrupted) => ExitCode::from(130),
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line, whatever an error from below thinks.
-            let text = format!("{error:#}").split_whitespace().collect::<Vec<_>>().join(" ");
-            eprintln!("hybray: {text}");
+            eprintln!("hybray: {}", one_line(&error));
             ExitCode::FAILURE
         }
     }
 }
 
+/// An error and its causes, each said once, whatever errors from below think; and what to do about those of the system.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string();
+        if !text.ends_with(&cause) {
+            let colon = if text.is_empty() { "" } else { ": " };
+            text = text + colon + &cause;
+        }
+    }
+    let remedy = match error.chain().find_map(|cause| cause.downcast_ref::<std::io::Error>()).map(std::io::Error::kind)
+    {
+        Some(ErrorKind::NotFound) => "; make the folder, or name another",
+        Some(ErrorKind::IsADirectory) => "; name a file in it",
+        Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => "; name a place that you may write to",
+        Some(ErrorKind::StorageFull) => "; make room, or name another place",
+        _ => "",
+    };
+    text.split_whitespace().collect::<Vec<_>>().join(" ") + remedy
+}
+
 /// `hybray ... | head` is no error.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .any(|cause| cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
+    error.chain().any(|cause| cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe))
+}
+
+/// In memory first: the generator panics where it cannot write.
+fn completions(shell: clap_complete::Shell) -> Result<End> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "hybray", &mut script);
+    std::io::stdout().write_all(&script)?;
+    Ok(End::Done)
 }
 
 fn man() -> Result<End> {

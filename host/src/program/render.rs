@@ -7,9 +7,10 @@ use super::{End, camera, load};
 use crate::model::Settings;
 use crate::picture::{Format, Output, Picture};
 use crate::prepare::Prepared;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use hybray_native::{DispatcherAt, Farm, Traced, trace};
 use hybray_scheduler::{Options, Outcome};
+use hybray_shading::Camera;
 use hybray_wire::Frame;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use std::time::{Duration, Instant};
 
 pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let start = Instant::now();
+    let interrupted = interrupts()?;
     // What could go wrong at the end is tried at the beginning.
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene));
     let output = Output::create(&path, Format::of(&path, args.bits == "16")?)?;
@@ -31,7 +33,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     model.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
     let camera = camera(&model.cameras, args.camera.as_deref())?.clone();
     show.line(&format!("{}: {} primitives", args.scene.scene, model.primitives()));
+    if interrupted.load(Ordering::Relaxed) {
+        return stopped_early(&show);
+    }
     let mut prepared = Prepared::new(model, &args.tree.settings())?;
+    if interrupted.load(Ordering::Relaxed) {
+        return stopped_early(&show);
+    }
     let wanted = Settings {
         size: args.size,
         spp: args.spp,
@@ -42,6 +50,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         seed: args.seed,
     };
     let frame = prepared.frame(&camera, &wanted);
+    check_camera(&frame)?;
     let exposure = prepared.exposure(&wanted);
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
     let farm = Farm {
@@ -54,7 +63,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         options: Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) },
     };
 
-    let interrupted = interrupts()?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     show.begin();
@@ -118,6 +126,20 @@ fn interrupts() -> Result<Arc<AtomicBool>> {
     })
     .context("this system has no way to tell of Ctrl-C")?;
     Ok(flag)
+}
+
+/// Nodes pass over a picture whose camera is none, so it is not sent to them: coordinates that are scaled with a tiny scene
+/// may leave the range of `f32`.
+fn check_camera(frame: &Frame) -> Result<()> {
+    let [eye, target, up] = [frame.eye, frame.target, frame.up].map(Into::into);
+    Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height)
+        .map_err(|error| anyhow!("{error}, in the scene's own unit: bring it nearer, or make the scene larger"))?;
+    Ok(())
+}
+
+fn stopped_early(show: &Show) -> Result<End> {
+    show.line("interrupted: nothing was drawn yet, and nothing is written");
+    Ok(End::Interrupted)
 }
 
 fn picture(frame: &Frame, traced: &Traced) -> Picture {

@@ -48,7 +48,12 @@ impl Tracer<'_> {
             return None;
         }
         let point = surface_point(&self.scene.resident.pages[hit.page as usize], &ray, &hit);
-        Some(Answer { t: shrink(hit.candidate.t, -steps), primitive: hit.candidate.id, uv: point.uv, normal: point.normal })
+        Some(Answer {
+            t: shrink(hit.candidate.t, -steps),
+            primitive: hit.candidate.id,
+            uv: point.uv,
+            normal: point.normal,
+        })
     }
 }
 
