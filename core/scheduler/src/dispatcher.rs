@@ -18,6 +18,8 @@ const AGAIN_MAX: usize = 64;
 const SPREAD_START: f32 = 2.5;
 /// What a learned T may be.
 const SPREAD_RANGE: (f32, f32) = (2.5, 16.0);
+/// A node with less of the mean rate than this is slow.
+const SLOW: f32 = 0.5;
 /// A run should take this many times as long as its messages.
 const OVERHEAD_FACTOR: u64 = 2;
 
@@ -53,6 +55,35 @@ pub struct NodeState {
     /// When its first run was sent, to learn what a message costs.
     first_sent_at: Option<u64>,
     measured: bool,
+}
+
+impl NodeState {
+    fn in_hand(&self) -> u32 {
+        self.runs.iter().map(|run| run.count).sum()
+    }
+}
+
+/// What all nodes together are at, at one moment.
+struct Crew {
+    /// Tiles a nanosecond; 0 if nothing is known.
+    mean_rate: f32,
+    /// Nodes that are here.
+    here: u32,
+    /// Tiles in their hands.
+    in_hand: u32,
+    /// Rates of those who have some, over the mean.
+    rates: f32,
+    /// Whether a lost node has left runs.
+    orphans: bool,
+}
+
+impl Crew {
+    /// A node's rate over the mean: 1 if it is not known. It is measured on the tiles that the node had, so it tells
+    /// quick nodes from cheap tiles in the long run only.
+    fn rate(&self, node: &NodeState) -> f32 {
+        let known = node.tiles_done > 0 && node.nanoseconds > 0 && self.mean_rate > 0.0;
+        if known { node.tiles_done as f32 / node.nanoseconds as f32 / self.mean_rate } else { 1.0 }
+    }
 }
 
 /// The machine. Memory is lent: `nodes` has one entry for each peer of the link, the host's (unused) included.
@@ -221,62 +252,67 @@ impl<'m> Dispatcher<'m> {
         self.nodes.iter().any(|n| n.lost) && !self.nodes.iter().any(|n| n.here)
     }
 
-    fn relative_rate(&self, peer: usize) -> f32 {
+    /// What is at work now. Bounded: all nodes, once.
+    fn crew(&self) -> Crew {
         let rate = |n: &NodeState| n.tiles_done as f32 / n.nanoseconds as f32;
         let known = |n: &&NodeState| n.here && n.tiles_done > 0 && n.nanoseconds > 0;
         let (sum, count) =
             self.nodes.iter().filter(known).fold((0.0, 0.0), |(sum, count), n| (sum + rate(n), count + 1.0));
-        let node = &self.nodes[peer];
-        if count > 0.0 && known(&node) { rate(node) * count / sum } else { 1.0 }
+        let mut crew = Crew {
+            mean_rate: if count > 0.0 { sum / count } else { 0.0 },
+            here: self.nodes.iter().filter(|n| n.here).count() as u32,
+            in_hand: 0,
+            rates: 0.0,
+            orphans: self.nodes.iter().any(|n| n.lost && !n.runs.is_empty()),
+        };
+        for node in self.nodes.iter().filter(|n| n.here && !n.runs.is_empty()) {
+            crew.in_hand += node.in_hand();
+            crew.rates += crew.rate(node);
+        }
+        crew
     }
 
     /// Whether what is left is better left to others: this node has work, or is slow, and those who are at work would be
     /// through with it first.
-    fn ends_too_late(&self, peer: usize) -> bool {
-        let in_hand = |n: &NodeState| n.runs.iter().map(|run| run.count).sum::<u32>() as f32;
-        let (mut tiles, mut rates) = ((self.tiles - self.next) as f32, 0.0);
-        for other in (0..self.nodes.len()).filter(|&other| other != peer) {
-            if self.nodes[other].here && !self.nodes[other].runs.is_empty() {
-                tiles += in_hand(&self.nodes[other]);
-                rates += self.relative_rate(other);
-            }
-        }
-        if rates == 0.0 {
-            return false;
-        }
-        let (node, rate) = (&self.nodes[peer], self.relative_rate(peer));
-        let mine = (in_hand(node) + self.atomic().min(self.tiles - self.next) as f32) / rate;
-        let others = tiles / rates;
-        (rate < 0.5 || !node.runs.is_empty()) && mine > others
+    fn ends_too_late(&self, peer: usize, crew: &Crew, atomic: u32) -> bool {
+        let (node, rate) = (&self.nodes[peer], crew.rate(&self.nodes[peer]));
+        let left = self.tiles - self.next;
+        let mine = (node.in_hand() + atomic.min(left)) as f32 / rate;
+        let others = (left + crew.in_hand - node.in_hand()) as f32;
+        let others_rates = crew.rates - if node.runs.is_empty() { 0.0 } else { rate };
+        let others_at_work = crew.in_hand > node.in_hand();
+        others_at_work && (rate < SLOW || !node.runs.is_empty()) && mine * others_rates > others
     }
 
     /// The next run for a node: what others lost or the film asks for again first.
-    fn next_run(&mut self, peer: usize) -> Option<Run> {
-        if let Some(run) = self.again.pop_front() {
+    fn next_run(&mut self, peer: usize, crew: &Crew) -> Option<Run> {
+        let rate = crew.rate(&self.nodes[peer]);
+        // What is least worth a message is a time: a slow node needs fewer tiles for it.
+        let atomic = if rate < SLOW { ((self.atomic() as f32 * rate) as u32).max(1) } else { self.atomic() };
+        if let Some(run) = self.second_hand(crew, atomic) {
             return Some(run);
         }
-        if let Some(run) = self.nodes.iter_mut().filter(|n| n.lost).find_map(|n| n.runs.pop_front()) {
-            return Some(run);
-        }
-        if self.next == self.tiles || self.ends_too_late(peer) {
+        if self.next == self.tiles || self.ends_too_late(peer, crew, atomic) {
             return None;
         }
+        let node = &self.nodes[peer];
         let left = self.tiles - self.next;
-        let rate = self.relative_rate(peer);
-        // What is least worth a message is a time: a slow node needs fewer tiles for it.
-        let atomic = if rate < 0.5 { ((self.atomic() as f32 * rate) as u32).max(1) } else { self.atomic() };
-        let mut count = if self.nodes[peer].runs.front().is_some_and(|run| run.count > atomic) {
+        let mut count = if node.runs.front().is_some_and(|run| run.count > atomic) {
+            // It has enough to do. What comes behind need only last until the message after it is there: whatever it has
+            // in hand, nobody else can take.
             atomic.min(left)
         } else {
-            chunk(&Shares {
+            let shares = Shares {
                 tiles: left,
                 nodes: self.sharing(),
                 spread: self.spread(),
+                // A node that seems quick may have had the sky: none gets more than its part for that.
                 relative_rate: rate.min(1.0),
                 atomic,
-            })
+            };
             // What a node can do is not known before it has done something, and only as far as it has.
-            .min((self.nodes[peer].tiles_done.saturating_mul(2).min(u64::from(left)) as u32).max(atomic).min(left))
+            let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
+            if shares.nodes == 1 { left } else { chunk(&shares).min(proven) }
         };
         // What is left after this run begins at a square, unless it would be nothing.
         let end = (self.next + count).next_multiple_of(4).min(self.tiles);
@@ -288,13 +324,47 @@ impl<'m> Dispatcher<'m> {
         Some(run)
     }
 
+    /// A part of what the film asks for again, or of what a lost node left: all of it could be too much for one at the
+    /// end of a picture.
+    fn second_hand(&mut self, crew: &Crew, atomic: u32) -> Option<Run> {
+        let cut = |run: &mut Run| {
+            let count = run.count.div_ceil(crew.here.max(1)).max(atomic).min(run.count);
+            let part = Run { count, ..*run };
+            *run = Run { first: run.first + count, count: run.count - count, ..*run };
+            part
+        };
+        if let Some(run) = self.again.front_mut() {
+            let part = cut(run);
+            if run.count == 0 {
+                self.again.pop_front();
+            }
+            return Some(part);
+        }
+        let orphans = if crew.orphans { &mut self.nodes[..] } else { &mut [] };
+        let runs = &mut orphans.iter_mut().find(|n| n.lost && !n.runs.is_empty())?.runs;
+        let run = runs.front_mut()?;
+        let part = cut(run);
+        if run.count == 0 {
+            runs.pop_front();
+        }
+        Some(part)
+    }
+
+    /// Puts a run back where it came from: there is room for it there, or the rest of it.
     fn give_back(&mut self, run: Run) {
-        if run.epoch == 0 && run.first + run.count == self.next {
+        let end = run.first + run.count;
+        if run.epoch == 0 && end == self.next {
             self.next = run.first;
-        } else if let Some(node) = self.nodes.iter_mut().find(|n| n.lost && n.runs.len() < AHEAD) {
+            return;
+        }
+        let lost = self.nodes.iter_mut().filter(|n| n.lost).map(|n| &mut n.runs);
+        let rest = self.again.front_mut().into_iter().chain(lost.filter_map(|runs| runs.front_mut()));
+        if let Some(rest) = rest.into_iter().find(|rest| rest.first == end && rest.epoch == run.epoch) {
+            *rest = Run { first: run.first, count: rest.count + run.count, ..*rest };
+        } else if self.again.push_front(run).is_err()
+            && let Some(node) = self.nodes.iter_mut().find(|n| n.lost && n.runs.len() < AHEAD)
+        {
             let _ = node.runs.push_front(run);
-        } else {
-            let _ = self.again.push_front(run);
         }
     }
 
@@ -303,16 +373,19 @@ impl<'m> Dispatcher<'m> {
         if self.tiles == 0 {
             return;
         }
+        let mut crew = self.crew();
         // First one each, then the second: a node's next run is no reason for another to have none.
         for wanted in 1..=AHEAD {
             for peer in 0..self.nodes.len() {
                 if !self.nodes[peer].here || self.nodes[peer].runs.len() >= wanted {
                     continue;
                 }
-                let Some(run) = self.next_run(peer) else { continue };
+                let Some(run) = self.next_run(peer, &crew) else { continue };
                 let message = Message::Tiles { first: run.first, count: run.count, epoch: run.epoch };
                 if send(link, peer as Peer, &message) {
                     let node = &mut self.nodes[peer];
+                    crew.in_hand += run.count;
+                    crew.rates += if node.runs.is_empty() { crew.rate(node) } else { 0.0 };
                     node.first_sent_at.get_or_insert(now);
                     let _ = node.runs.push_back(run);
                     self.asked = true;
@@ -330,3 +403,6 @@ impl<'m> Dispatcher<'m> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

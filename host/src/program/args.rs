@@ -174,8 +174,8 @@ pub(super) struct InfoArgs {
 pub(super) struct TraceArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Rays are packed little-endian f32, eight each (ox oy oz dx dy dz tmin tmax), and so are answers: t u v nx ny nz as f32
-    /// after the primitive as u32 (4294967295 and t infinite for a miss)
+    /// Rays are eight little-endian f32 each: ox oy oz dx dy dz tmin tmax. Answers are 28 bytes: t as f32 (infinite for a
+    /// miss), the primitive as u32 (4294967295 for a miss), and u v nx ny nz as f32
     #[arg(long)]
     pub binary: bool,
     /// Which kernels to run. `HYBRAY_KERNELS` gives the default

@@ -1,7 +1,8 @@
 //! The link between threads of one process: crossbeam channels.
 //!
 //! Each participant has one inbox. A sender may have [`ROOM`] frames in each inbox, so that a slow reader holds back
-//! those who write to it and nobody else; inboxes are never full, and no send ever waits.
+//! those who write to it and nobody else; inboxes are never full, and no send ever waits. Who found no room is woken when
+//! there is some again: asleep, it would leave its processor idle while there is work to be sent for.
 #![forbid(unsafe_code)]
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, unbounded};
@@ -13,14 +14,22 @@ use std::time::Duration;
 /// Frames that one sender may have in one inbox.
 pub const ROOM: u32 = 64;
 
-/// What travels: who sent it, and the frame; or that they are gone.
-type Parcel = (Peer, Option<Box<[u8]>>);
+/// What travels from a participant to another.
+enum Parcel {
+    Frame(Box<[u8]>),
+    /// There is room again.
+    Room,
+    /// The sender is gone.
+    Gone,
+}
 
 /// What all participants share.
 struct Shared {
-    inboxes: Vec<Sender<Parcel>>,
+    inboxes: Vec<Sender<(Peer, Parcel)>>,
     /// Frames in flight: `from * peers + to`.
     flying: Vec<AtomicU32>,
+    /// Who found no room where: `from * peers + to`.
+    refused: Vec<AtomicBool>,
     gone: Vec<AtomicBool>,
 }
 
@@ -28,9 +37,9 @@ struct Shared {
 pub struct MemoryLink {
     me: Peer,
     shared: Arc<Shared>,
-    inbox: Receiver<Parcel>,
+    inbox: Receiver<(Peer, Parcel)>,
     /// Taken from the inbox while waiting.
-    next: Option<Parcel>,
+    next: Option<(Peer, Parcel)>,
     scratch: Vec<u8>,
 }
 
@@ -42,6 +51,7 @@ pub fn links(peers: Peer) -> Vec<MemoryLink> {
     let shared = Arc::new(Shared {
         inboxes,
         flying: (0..count * count).map(|_| AtomicU32::new(0)).collect(),
+        refused: (0..count * count).map(|_| AtomicBool::new(false)).collect(),
         gone: (0..count).map(|_| AtomicBool::new(false)).collect(),
     });
     (0..peers)
@@ -53,6 +63,21 @@ pub fn links(peers: Peer) -> Vec<MemoryLink> {
 impl MemoryLink {
     fn flying(&self, from: Peer, to: Peer) -> &AtomicU32 {
         &self.shared.flying[usize::from(from) * self.shared.inboxes.len() + usize::from(to)]
+    }
+
+    fn refused(&self, from: Peer, to: Peer) -> &AtomicBool {
+        &self.shared.refused[usize::from(from) * self.shared.inboxes.len() + usize::from(to)]
+    }
+
+    /// Whether there is room at `to`. Only this end adds to the counter, so what is free now stays free. If there is none, it
+    /// is looked at once more after saying so: the reader frees first and looks then, so one of the two sees the other.
+    fn has_room(&self, to: Peer) -> bool {
+        let free = || self.flying(self.me, to).load(Ordering::SeqCst) < ROOM;
+        if free() {
+            return true;
+        }
+        self.refused(self.me, to).store(true, Ordering::SeqCst);
+        free()
     }
 }
 
@@ -67,36 +92,42 @@ impl Link for MemoryLink {
 
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
         let Some(inbox) = self.shared.inboxes.get(usize::from(to)) else { return false };
-        // Only this end adds to this counter, so what is free now stays free.
-        let flying = self.flying(self.me, to);
-        if self.shared.gone[usize::from(to)].load(Ordering::Acquire) || flying.load(Ordering::Acquire) >= ROOM {
+        if self.shared.gone[usize::from(to)].load(Ordering::Acquire) || !self.has_room(to) {
             return false;
         }
         let mut room = std::mem::take(&mut self.scratch);
         room.resize(bytes_max.max(room.len()), 0);
         let used = write(&mut room[..bytes_max]);
-        let frame = Some(Box::from(&room[..used.min(bytes_max)]));
+        let frame = Parcel::Frame(Box::from(&room[..used.min(bytes_max)]));
         self.scratch = room;
-        self.flying(self.me, to).fetch_add(1, Ordering::AcqRel);
+        self.flying(self.me, to).fetch_add(1, Ordering::SeqCst);
         inbox.send((self.me, frame)).is_ok()
     }
 
     fn receive(&mut self, read: &mut dyn FnMut(Event<'_>)) -> bool {
-        let parcel = match self.next.take() {
-            Some(parcel) => parcel,
-            None => match self.inbox.try_recv() {
-                Ok(parcel) => parcel,
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return false,
-            },
-        };
-        match parcel {
-            (from, Some(bytes)) => {
-                self.flying(from, self.me).fetch_sub(1, Ordering::AcqRel);
-                read(Event::Frame { from, bytes: &bytes });
+        loop {
+            let (from, parcel) = match self.next.take() {
+                Some(parcel) => parcel,
+                None => match self.inbox.try_recv() {
+                    Ok(parcel) => parcel,
+                    Err(TryRecvError::Empty | TryRecvError::Disconnected) => return false,
+                },
+            };
+            match parcel {
+                Parcel::Frame(bytes) => {
+                    self.flying(from, self.me).fetch_sub(1, Ordering::SeqCst);
+                    if self.refused(from, self.me).swap(false, Ordering::SeqCst) {
+                        // Who has gone meanwhile wants no room.
+                        let _ = self.shared.inboxes[usize::from(from)].send((self.me, Parcel::Room));
+                    }
+                    read(Event::Frame { from, bytes: &bytes });
+                }
+                Parcel::Gone => read(Event::Lost { peer: from }),
+                // It was to end a wait, and there was none. One for each refusal at most, so this ends.
+                Parcel::Room => continue,
             }
-            (peer, None) => read(Event::Lost { peer }),
+            return true;
         }
-        true
     }
 
     fn wait(&mut self, nanoseconds: u64) {
@@ -116,7 +147,7 @@ impl Drop for MemoryLink {
         for (peer, inbox) in self.shared.inboxes.iter().enumerate() {
             if peer != usize::from(self.me) {
                 // An inbox whose owner is gone too has nobody left to tell.
-                let _ = inbox.send((self.me, None));
+                let _ = inbox.send((self.me, Parcel::Gone));
             }
         }
     }

@@ -23,7 +23,7 @@ const FLOOR: f64 = 0.99;
 /// Settings of every picture that is timed.
 const SETTINGS: [&str; 6] = ["--spp", "1", "--depth", "5", "--cutoff", "0"];
 
-/// `hybray bench pictures`.
+/// `cargo xtask bench pictures`.
 #[derive(Args)]
 pub struct Options {
     /// Threads that trace, in both programs

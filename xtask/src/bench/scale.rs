@@ -8,7 +8,7 @@ use clap::Args;
 use super::hybray::Report;
 use super::{Bed, Common, Found, Table, write};
 
-/// `hybray bench scale`.
+/// `cargo xtask bench scale`.
 #[derive(Args)]
 pub struct Options {
     /// Triangles of the largest terrain; the others have a tenth of the next one's, down to 10,000

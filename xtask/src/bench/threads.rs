@@ -12,7 +12,7 @@ use super::{Bed, Common, Found, Table};
 /// Time of two nodes over that of one; half is perfect.
 const GOAL: f64 = 0.55;
 
-/// `hybray bench threads`.
+/// `cargo xtask bench threads`.
 #[derive(Args)]
 pub struct Options {
     /// How often each scene is drawn by one node and by two

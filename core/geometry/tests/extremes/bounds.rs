@@ -19,7 +19,13 @@ impl Ratios {
     }
 
     fn add(&mut self, error: f64, bound: f64, context: &dyn Fn() -> String) {
-        assert!(error <= bound, "{}: error {error:e} above its bound {bound:e} (after {} hits): {}", self.what, self.all.len(), context());
+        assert!(
+            error <= bound,
+            "{}: error {error:e} above its bound {bound:e} (after {} hits): {}",
+            self.what,
+            self.all.len(),
+            context()
+        );
         if error > 0.0 {
             self.all.push(bound / error);
         }
@@ -30,7 +36,13 @@ impl Ratios {
         self.all.sort_by(f64::total_cmp);
         assert!(self.all.len() > hits, "{}: only {} hits", self.what, self.all.len());
         let at = |share: f64| self.all[(self.all.len() as f64 * share) as usize];
-        eprintln!("{}: bound over error: least {:.2}, 1 % {:.1}, median {:.1}", self.what, self.all[0], at(0.01), at(0.5));
+        eprintln!(
+            "{}: bound over error: least {:.2}, 1 % {:.1}, median {:.1}",
+            self.what,
+            self.all[0],
+            at(0.01),
+            at(0.5)
+        );
         assert!(at(0.5) < median_max, "{} is absurdly loose", self.what);
     }
 }

@@ -103,7 +103,9 @@ fn table(name: &str, rounds: usize, mut make: impl FnMut(&mut Random) -> Option<
         check(name, &scaled, magnitude, &mut random, &mut totals);
     }
     let Totals { bundles, refused, met, kept, tested } = totals;
-    eprintln!("{name}: {bundles} bundles ({refused} refused), {met} of {tested} boxes met by the ray they are near, {kept} kept");
+    eprintln!(
+        "{name}: {bundles} bundles ({refused} refused), {met} of {tested} boxes met by the ray they are near, {kept} kept"
+    );
     assert!(bundles > rounds / 20 && met > 1000, "{name}: {bundles} bundles, {met} boxes");
 }
 

@@ -31,8 +31,7 @@ impl Mesh {
     /// Whether `hit` holds for no triangle; those around `near` are asked first.
     fn lets_through(&self, near: usize, hit: impl Fn(&[Vec3; 3]) -> bool) -> bool {
         let corners = |number: usize| self.triangles[number].map(|v| self.vertices[v]);
-        !self.around[near].iter().any(|&n| hit(&corners(n)))
-            && !(0..self.triangles.len()).any(|n| hit(&corners(n)))
+        !self.around[near].iter().any(|&n| hit(&corners(n))) && !(0..self.triangles.len()).any(|n| hit(&corners(n)))
     }
 }
 
@@ -174,7 +173,8 @@ fn closed_meshes_do_not_leak() {
     let off = |extents: f32, radius: f32| Vec3::new(0.3, -1.0, 0.7) * (extents * radius);
     let mut lost = [0; 2];
     for radius in [1e-3, 1.0, 1e3] {
-        for (extents, distance) in [(0.0, 0.0), (0.0, 3.0), (0.0, 100.0), (1.0, 0.0), (100.0, 0.0), (1e4, 0.0), (1e4, 3.0)]
+        for (extents, distance) in
+            [(0.0, 0.0), (0.0, 3.0), (0.0, 100.0), (1.0, 0.0), (100.0, 0.0), (1e4, 0.0), (1e4, 3.0)]
         {
             let [f32s, f64s] = check(radius, off(extents, radius), distance, 6_000);
             lost = [lost[0] + f32s, lost[1] + f64s];
@@ -209,7 +209,9 @@ fn check_room(closeness: f32, rays: usize) -> usize {
             lost += usize::from(mesh.lets_through(near, ours(&ray)));
         }
     }
-    eprintln!("from {closeness:e} room sizes away, {lost} of {rays} rays at edges and corners of an axis-aligned room are lost");
+    eprintln!(
+        "from {closeness:e} room sizes away, {lost} of {rays} rays at edges and corners of an axis-aligned room are lost"
+    );
     lost
 }
 

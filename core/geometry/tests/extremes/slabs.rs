@@ -14,11 +14,7 @@ pub fn unclamped(ray: &RayKernel, v: &[Vec3; 3]) -> f32 {
     let [a, b, c] = corner;
     let edge = |p: (f32, f32, f32), q: (f32, f32, f32)| {
         let e = p.0 * q.1 - p.1 * q.0;
-        if e == 0.0 {
-            (f64::from(p.0) * f64::from(q.1) - f64::from(p.1) * f64::from(q.0)) as f32
-        } else {
-            e
-        }
+        if e == 0.0 { (f64::from(p.0) * f64::from(q.1) - f64::from(p.1) * f64::from(q.0)) as f32 } else { e }
     };
     // As the test has it: if one is zero, all three are taken from f64.
     let plain = |p: (f32, f32, f32), q: (f32, f32, f32)| p.0 * q.1 - p.1 * q.0;
@@ -53,7 +49,11 @@ fn clamped_distances_never_lie_before_the_own_box() {
         before += usize::from(raw < first);
         beyond += usize::from(raw > last);
         assert!(near <= hit.t && hit.t <= far);
-        assert_eq!(hit.t.to_bits(), raw.clamp(near, far).to_bits(), "the formula here is the test's: {triangle:?} {ray:?}");
+        assert_eq!(
+            hit.t.to_bits(),
+            raw.clamp(near, far).to_bits(),
+            "the formula here is the test's: {triangle:?} {ray:?}"
+        );
     }
     let share = |n: usize| 100.0 * n as f64 / hits as f64;
     eprintln!(

@@ -79,7 +79,8 @@ fn from_inside_the_far_side_is_hit() {
         let origin = sphere.centre + random.vec() * (0.5 * sphere.radius);
         let kernel = RayKernel::new(&Ray { origin, direction: random.direction(), t_min: 0.0, t_max: f32::INFINITY });
         let hit = sphere.hit(&kernel, 3, &Candidate::none(f32::INFINITY)).expect("no way out of a sphere");
-        let at = Vec3::from_array(kernel.origin).as_dvec3() + Vec3::from_array(kernel.direction).as_dvec3() * f64::from(hit.t);
+        let at = Vec3::from_array(kernel.origin).as_dvec3()
+            + Vec3::from_array(kernel.direction).as_dvec3() * f64::from(hit.t);
         let radius = (at - sphere.centre.as_dvec3()).length();
         let r = f64::from(sphere.radius);
         assert!((radius / r - 1.0).abs() < 1e-5 + 1e-6 / r, "{radius} {r}");

@@ -95,15 +95,16 @@ fn equal_nodes_end_together() {
         let report = play(t);
         let name = t.map_or("8 nodes, T learned".into(), |t| format!("8 nodes, T = {t}"));
         found.push((show(&name, &costs, &speeds, &report), report.runs));
-        // The next run is there before the last one ends.
-        if true { continue; } assert!(report.gaps <= report.time * 8 / 1000, "{name}: waited {} ns", report.gaps);
+        // The next run is there before the last one ends: nobody waits for a thousandth of the time.
+        assert!(report.gaps <= report.time * speeds.len() as u64 / 1000, "{name}: waited {} ns", report.gaps);
     }
     let (efficiencies, runs): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    // The papers' finding: equal parts are bad, and from 2 on all is well.
+    // POV||Ray's finding: equal parts are bad, and from 2 on all is well.
     assert!(efficiencies[0] < 0.9, "T = 1: {}", efficiencies[0]);
     assert!(efficiencies[1..].iter().all(|&e| e > 0.95), "{efficiencies:?}");
+    assert!(efficiencies[4] > 0.98, "learned: {}", efficiencies[4]);
     assert!(runs[0] < runs[1] && runs[1] <= runs[3], "{runs:?}");
-    assert!(runs[4] < 270, "a tenth of the tiles, not {} runs", runs[4]);
+    assert!(runs[4] < costs.len() as u64 / 4, "{} runs for {} tiles", runs[4], costs.len());
 }
 
 #[test]
@@ -114,47 +115,52 @@ fn unlike_nodes_end_together() {
         let report = farm(&costs, &speeds, spread(t), NEAR);
         let name = t.map_or("4 + 4 at a quarter, T learned".into(), |t| format!("4 + 4 at a quarter, T = {t}"));
         let efficiency = show(&name, &costs, &speeds, &report);
-        if true { continue; } assert!(efficiency > if t.is_none() { 0.93 } else { 0.85 }, "{name}: {efficiency}");
+        // Costs differ by more than these T promise; what is learned promises less.
+        assert!(efficiency > if t.is_none() { 0.97 } else { 0.7 }, "{name}: {efficiency}");
     }
 }
 
-/// A node that is ten times slower than seven others adds little, and must cost less.
+/// A node that is much slower than seven others adds little, and must cost little. It can cost no less than one dear run of
+/// its own: nobody can take over what it has.
 #[test]
 fn a_slow_node_does_not_delay_the_end() {
     let costs = uneven();
     let without = farm(&costs, &[1; 7], spread(None), NEAR);
     show("7 nodes", &costs, &[1; 7], &without);
-    for slow in [10, 40] {
-        for t in [None, Some(2.5)] {
-            let speeds = [1, 1, 1, 1, 1, 1, 1, slow];
-            let report = farm(&costs, &speeds, spread(t), NEAR);
-            show(&format!("7 nodes + 1 at 1/{slow}, T {t:?}"), &costs, &speeds, &report);
-            let more = report.time as f64 / without.time as f64 - 1.0;
-            if false {}; let _ = more; if 1==1 {continue;} assert!(more < 0.03, "slower by {:.1} % with a node at 1/{slow}", 100.0 * more);
-        }
+    for (slow, most) in [(4, 0.0), (10, 0.05), (40, 0.2)] {
+        let speeds = [1, 1, 1, 1, 1, 1, 1, slow];
+        let report = farm(&costs, &speeds, spread(None), NEAR);
+        show(&format!("7 nodes + 1 at 1/{slow}"), &costs, &speeds, &report);
+        let more = report.time as f64 / without.time as f64 - 1.0;
+        assert!(more < most, "slower by {:.1} % with a node at 1/{slow}", 100.0 * more);
     }
 }
 
 #[test]
-fn slow_links_make_larger_runs() {
+fn a_dispatcher_near_the_nodes_makes_up_for_a_slow_link() {
     let costs = uneven();
+    let mut found = Vec::new();
     for delay_max in [0, 50_000, 1_000_000, 5_000_000] {
         for (dispatcher, at) in [(HOST, "host"), (1, "node")] {
             let manner = Manner { delay_max, far_host: true, ..NEAR };
             let report = farm_at(dispatcher, &costs, &[1; 8], spread(None), manner);
             let name = format!("messages of {} us, dispatcher at {at}", delay_max / 1000);
             let efficiency = show(&name, &costs, &[1; 8], &report);
-            if false {}; let _ = efficiency; if 1==1 {continue;} assert!(efficiency > 0.85, "{name}: {efficiency}");
+            found.push((name, efficiency));
         }
     }
+    // Messages of 10 ms there and back, in a picture of 200 ms: what a dispatcher near the nodes is for.
+    let far = found.split_off(6);
+    assert!(found.iter().all(|(_, e)| *e > 0.92), "{found:?}");
+    assert!(far[0].1 < 0.75 && far[1].1 > 0.95, "{far:?}");
 }
 
 #[test]
 fn many_nodes_end_together() {
     let costs = uneven();
-    for (nodes, least) in [(1, 0.97), (2, 0.97), (14, 0.9), (38, 0.8), (64, 0.7)] {
+    for (nodes, least) in [(1, 0.99), (2, 0.99), (14, 0.98), (38, 0.8), (64, 0.7)] {
         let report = farm(&costs, &vec![1; nodes], spread(None), NEAR);
         let efficiency = show(&format!("{nodes} nodes"), &costs, &vec![1; nodes], &report);
-        if true { continue; } assert!(efficiency > least, "{nodes} nodes: {efficiency}");
+        assert!(efficiency > least, "{nodes} nodes: {efficiency}");
     }
 }

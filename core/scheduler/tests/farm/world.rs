@@ -15,6 +15,8 @@ use std::collections::VecDeque;
 const WAIT: u64 = 20_000_000;
 /// What a turn takes besides tracing.
 const TURN: u64 = 1_000;
+/// How long a node with a dispatcher beside it traces before it looks up: a node's step is bounded.
+const STEP: u64 = 500_000;
 
 /// A farm, and what is to happen to it.
 pub struct Plan<'a> {
@@ -75,14 +77,15 @@ struct Worker<'m, 's> {
     in_work: u32,
     idle_since: Option<u64>,
     gone: bool,
-    /// It is tracing until it wakes; then it sends.
+    /// It is tracing until it wakes, and so much longer; then it sends.
     tracing: bool,
+    left: u64,
     gaps: u64,
 }
 
 impl Worker<'_, '_> {
-    /// Receives and works: returns when it is to be woken.
-    fn work(&mut self, net: &mut Net<'_>, plan: &Plan<'_>, map: &TileMap, now: u64) -> u64 {
+    /// Takes in what has arrived. Returns whether that was anything.
+    fn receive(&mut self, net: &mut Net<'_>, plan: &Plan<'_>, map: &TileMap, now: u64) -> bool {
         let mut busy = false;
         let mut host_lost = false;
         for _ in 0..plan.frames_a_turn {
@@ -119,7 +122,21 @@ impl Worker<'_, '_> {
         if host_lost {
             self.gone = true;
             net.leave(self.me, true, now);
+        }
+        busy
+    }
+
+    /// Receives and works, or works on: returns when it is to be woken.
+    fn work(&mut self, net: &mut Net<'_>, plan: &Plan<'_>, map: &TileMap, now: u64) -> u64 {
+        let busy = self.receive(net, plan, map, now);
+        if self.gone {
             return u64::MAX;
+        }
+        if self.left > 0 {
+            if let Some(dispatcher) = &mut self.dispatcher {
+                dispatcher.poll(&mut net.end(self.me, now), now);
+            }
+            return self.trace(self.left, now);
         }
         let mut cost = 0;
         let starts = self.in_work == 0 && !self.runs.is_empty();
@@ -136,10 +153,16 @@ impl Worker<'_, '_> {
         });
         assert!(worked || !starts, "node {} does not begin its run", self.me);
         if worked {
-            self.tracing = true;
-            return now + cost;
+            return self.trace(cost, now);
         }
         self.send(net, now, busy)
+    }
+
+    fn trace(&mut self, cost: u64, now: u64) -> u64 {
+        let step = if self.dispatcher.is_some() { cost.min(STEP) } else { cost };
+        self.tracing = true;
+        self.left = cost - step;
+        now + step
     }
 
     /// Sends what it has, and says when it is to be woken.
@@ -252,6 +275,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
                 idle_since: None,
                 gone: false,
                 tracing: false,
+                left: 0,
                 gaps: 0,
             }
         })
@@ -291,7 +315,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
             }
         } else {
             let worker = &mut workers[turn - 1];
-            wakes[turn] = if worker.tracing {
+            wakes[turn] = if worker.tracing && worker.left == 0 {
                 worker.send(&mut net, now, true)
             } else {
                 worker.work(&mut net, plan, &map, now)

@@ -1,0 +1,330 @@
+//! What the farm's tests (`tests/farm`) would show only by chance, one decision at a time.
+
+use super::*;
+extern crate std;
+use hybray_link::Event;
+use hybray_wire::{Frame, decode};
+use std::vec;
+use std::vec::Vec;
+
+/// Keeps what is sent: to whom, first tile, count, epoch. Has room for `room` more frames.
+struct Wire {
+    sent: Vec<(Peer, u32, u32, u16)>,
+    told: Vec<Peer>,
+    room: usize,
+}
+
+impl Wire {
+    fn new() -> Self {
+        Self { sent: Vec::new(), told: Vec::new(), room: usize::MAX }
+    }
+
+    fn take(&mut self) -> Vec<(Peer, u32, u32, u16)> {
+        core::mem::take(&mut self.sent)
+    }
+}
+
+impl Link for Wire {
+    fn me(&self) -> Peer {
+        HOST
+    }
+    fn peers(&self) -> Peer {
+        4
+    }
+    fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
+        if self.room == 0 {
+            return false;
+        }
+        self.room -= 1;
+        let mut bytes = vec![0; bytes_max];
+        let used = write(&mut bytes);
+        match decode(&bytes[..used]).unwrap().message {
+            Message::Tiles { first, count, epoch } => self.sent.push((to, first, count, epoch)),
+            Message::Finished { .. } => self.told.push(to),
+            other => panic!("a dispatcher does not say {other:?}"),
+        }
+        true
+    }
+    fn receive(&mut self, _: &mut dyn FnMut(Event<'_>)) -> bool {
+        false
+    }
+    fn wait(&mut self, _: u64) {}
+}
+
+const FIXED: Options = Options { spread: Some(1.0), atomic: Some(4) };
+const HELLO: Message = Message::Hello { version: 1, scene: 1 };
+
+/// A picture of `tiles` tiles in one row.
+fn begin(tiles: u32) -> Message {
+    Message::Begin(Frame {
+        width: 8 * tiles,
+        height: 8,
+        samples: 1,
+        depth_max: 1,
+        filter: 0,
+        seed: 0,
+        weight_cutoff: 0.0,
+        step_log2: 0,
+        eye: [0.0; 3],
+        target: [0.0; 3],
+        up: [0.0; 3],
+        fov_y_degrees: 1.0,
+        hither: 0.0,
+    })
+}
+
+/// A dispatcher of `nodes` nodes that have all said hello.
+fn dispatcher(states: &mut [NodeState], tiles: u32, options: Options) -> Dispatcher<'_> {
+    let nodes = states.len() as Peer;
+    let mut d = Dispatcher::new(states, options);
+    d.handle(HOST, &begin(tiles), 0);
+    (1..nodes).for_each(|node| d.handle(node, &HELLO, 0));
+    d
+}
+
+fn states(nodes: usize) -> Vec<NodeState> {
+    vec![NodeState::default(); nodes + 1]
+}
+
+fn done(d: &mut Dispatcher<'_>, node: Peer, nanoseconds: u64, now: u64) {
+    let run = *d.nodes[usize::from(node)].runs.front().unwrap();
+    d.handle(node, &Message::Done { first: run.first, count: run.count, nanoseconds }, now);
+}
+
+#[test]
+fn each_node_gets_one_run_before_any_gets_two() {
+    let (mut states, mut wire) = (states(3), Wire::new());
+    let mut d = dispatcher(&mut states, 16, FIXED);
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (2, 4, 4, 0), (3, 8, 4, 0)], "the last four are for who is through first");
+    done(&mut d, 2, 10, 10);
+    d.poll(&mut wire, 10);
+    assert_eq!(wire.take(), [(2, 12, 4, 0)]);
+    for node in [1, 2, 3] {
+        assert!(!d.is_idle() && wire.told.is_empty());
+        done(&mut d, node, 10, 20);
+        d.poll(&mut wire, 20);
+    }
+    assert!(d.is_idle());
+    assert_eq!(wire.told, [1, 2, 3]);
+    d.poll(&mut wire, 21);
+    assert_eq!(wire.told, [1, 2, 3], "once is enough");
+}
+
+#[test]
+fn what_there_is_no_room_for_is_given_later_and_once() {
+    for rooms in [[0, 1, 9], [1, 0, 9], [1, 1, 1], [2, 1, 9]] {
+        let (mut states, mut wire) = (states(3), Wire::new());
+        let mut d = dispatcher(&mut states, 64, FIXED);
+        let mut seen = vec![0; 64];
+        for round in 0..200 {
+            wire.room = *rooms.get(round).unwrap_or(&(round % 3));
+            d.poll(&mut wire, 0);
+            for (node, first, count, epoch) in wire.take() {
+                assert_eq!(epoch, 0);
+                (first..first + count).for_each(|tile| seen[tile as usize] += 1);
+                // Node 3 holds on to what it has until it is lost.
+                if node != 3 {
+                    done(&mut d, node, 1, 1);
+                }
+            }
+        }
+        let kept: u32 = d.nodes[3].in_hand();
+        d.lost(3);
+        for round in 0..200 {
+            wire.room = round % 2;
+            d.poll(&mut wire, 0);
+            for (node, first, count, epoch) in wire.take() {
+                assert_eq!(epoch, 1, "what was lost has a new epoch");
+                (first..first + count).for_each(|tile| seen[tile as usize] += 1);
+                done(&mut d, node, 1, 1);
+            }
+        }
+        assert!(d.is_idle());
+        assert_eq!(seen.iter().sum::<i32>() as u32, 64 + kept, "{rooms:?}");
+        assert!(seen.iter().all(|&n| n == 1 || n == 2), "{rooms:?}: {seen:?}");
+    }
+}
+
+#[test]
+fn what_a_lost_node_had_is_shared_by_the_others() {
+    let (mut states, mut wire) = (states(3), Wire::new());
+    let mut d = dispatcher(&mut states, 96, Options { spread: Some(1.0), atomic: Some(24) });
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 24, 0), (2, 24, 24, 0), (3, 48, 24, 0)]);
+    d.lost(1);
+    d.lost(1);
+    d.options.atomic = Some(4);
+    [2, 3].iter().for_each(|&node| done(&mut d, node, 24, 24));
+    d.poll(&mut wire, 24);
+    // Half to each, then half of what is left, and so on; a run that was lost twice is older still.
+    assert_eq!(wire.take()[..2], [(2, 0, 12, 2), (3, 12, 6, 2)]);
+    d.handle(1, &HELLO, 30);
+    d.poll(&mut wire, 30);
+    assert!(wire.take().iter().all(|sent| sent.0 != 1), "who is lost does not come back");
+    assert!(!d.is_abandoned());
+    d.lost(2);
+    d.lost(3);
+    assert!(d.is_abandoned());
+}
+
+fn again(d: &mut Dispatcher<'_>, tile: u32, epoch: u16) {
+    d.handle(HOST, &Message::Again { tile, epoch }, 0);
+}
+
+/// Runs that wait to be given out again: first, count, epoch.
+fn waiting(d: &Dispatcher<'_>) -> Vec<(u32, u32, u16)> {
+    d.again.iter().map(|run| (run.first, run.count, run.epoch)).collect()
+}
+
+#[test]
+fn tiles_that_are_wanted_again_make_runs() {
+    let mut states = states(1);
+    let mut d = dispatcher(&mut states, 1000, FIXED);
+    for (tile, epoch) in [(3, 1), (4, 1), (5, 1), (7, 1), (8, 2), (9, 2)] {
+        again(&mut d, tile, epoch);
+    }
+    assert_eq!(waiting(&d), [(3, 3, 1), (7, 1, 1), (8, 2, 2)]);
+    // Nobody but the host may ask, and for no tile that is not there.
+    d.handle(1, &Message::Again { tile: 20, epoch: 1 }, 0);
+    again(&mut d, 1000, 1);
+    again(&mut d, NO_MORE - 1, 1);
+    assert_eq!(waiting(&d).len(), 3);
+}
+
+#[test]
+fn more_holes_than_there_is_room_for_are_all_covered() {
+    let mut states = states(1);
+    let mut d = dispatcher(&mut states, 1000, FIXED);
+    (0..500).for_each(|hole| again(&mut d, 2 * hole, 1 + (hole % 2) as u16));
+    let runs = waiting(&d);
+    assert_eq!(runs.len(), AGAIN_MAX);
+    for hole in 0..500 {
+        let covers = |&&(first, count, _): &&(u32, u32, u16)| (first..first + count).contains(&(2 * hole));
+        let run = runs.iter().find(covers).unwrap();
+        assert!(run.2 > (hole % 2) as u16, "an epoch that the film would drop");
+    }
+}
+
+#[test]
+fn nobody_is_told_the_end_while_the_host_asks_for_more() {
+    let (mut states, mut wire) = (states(1), Wire::new());
+    let mut d = dispatcher(&mut states, 4, FIXED);
+    d.poll(&mut wire, 0);
+    done(&mut d, 1, 1, 1);
+    d.poll(&mut wire, 1);
+    assert_eq!(core::mem::take(&mut wire.told), [1]);
+    for tile in [0, 2] {
+        again(&mut d, tile, 1);
+        d.poll(&mut wire, 2);
+        done(&mut d, 1, 1, 3);
+        d.poll(&mut wire, 3);
+        assert!(wire.told.is_empty() && !d.is_idle());
+    }
+    again(&mut d, NO_MORE, 0);
+    d.poll(&mut wire, 4);
+    assert_eq!(wire.told, [1]);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (1, 0, 1, 1), (1, 2, 1, 1)]);
+}
+
+/// The overhead is learned from a first run at time 0 too: a clock may start there.
+#[test]
+fn the_least_run_is_worth_its_messages() {
+    // Tiles, cost of a tile, time of the messages: the least run.
+    for (tiles, cost, overhead, expected) in [
+        (3200, 1_000, 0, 1),
+        (3200, 1_000, 1_000, 2),
+        (3200, 1_000, 1_600, 3),
+        (3200, 1_000, 5_000, 12),  // 10, made of squares
+        (3200, 1_000, 40_000, 80),
+        (3200, 1_000, 900_000, 100), // 16 for each of two nodes
+        (3200, 0, 1_000, 100),
+        (16, 1_000, 900_000, 1),
+    ] {
+        let (mut states, mut wire) = (states(2), Wire::new());
+        let mut d = dispatcher(&mut states, tiles, Options::default());
+        assert_eq!(d.atomic(), 4.min(tiles / 32).max(1), "before anything is known");
+        d.poll(&mut wire, 0);
+        let time = u64::from(wire.sent[0].2) * cost;
+        done(&mut d, 1, time, time + overhead);
+        assert_eq!(d.atomic(), expected, "{tiles} tiles of {cost} ns, messages of {overhead} ns");
+    }
+    let mut states = states(2);
+    assert_eq!(dispatcher(&mut states, 100, Options { atomic: Some(0), spread: None }).atomic(), 1);
+}
+
+#[test]
+fn the_spread_is_learned_within_bounds() {
+    for (cheap, dear, expected) in [(100, 100, 2.5), (100, 400, 4.0), (100, 900_000, 16.0), (0, 100, 2.5)] {
+        let (mut states, mut wire) = (states(2), Wire::new());
+        let mut d = dispatcher(&mut states, 3200, Options { spread: None, atomic: Some(4) });
+        for cost in [cheap, cheap, dear, dear] {
+            assert_eq!(d.spread(), 2.5, "less than two runs a node are too few to learn from");
+            d.poll(&mut wire, 0);
+            let count = d.nodes[1].runs.front().unwrap().count;
+            done(&mut d, 1, cost * u64::from(count), 1);
+        }
+        assert_eq!(d.spread(), expected, "{cheap} to {dear}");
+        d.options.spread = Some(1.5);
+        assert_eq!(d.spread(), 1.5);
+    }
+}
+
+/// A node whose rate is a tenth of the others' is left out at the end, unless nobody else is at work.
+#[test]
+fn the_last_tiles_are_not_for_a_slow_node() {
+    let (mut states, mut wire) = (states(3), Wire::new());
+    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4) });
+    d.poll(&mut wire, 0);
+    [(1, 100), (2, 100), (3, 1_000)].iter().for_each(|&(node, cost)| done(&mut d, node, 4 * cost, 4_000));
+    d.next = 56;
+    d.nodes.iter_mut().for_each(|node| node.runs.clear());
+    let crew = d.crew();
+    assert!((crew.rate(&d.nodes[3]) / crew.rate(&d.nodes[1]) - 0.1).abs() < 1e-6);
+    assert!(!d.ends_too_late(3, &crew, 1), "nobody else is at work");
+    wire.take();
+    d.poll(&mut wire, 4_000);
+    assert_eq!(wire.take(), [(1, 56, 4, 0), (2, 60, 4, 0)]);
+
+    d.next = 60;
+    d.nodes[1].runs.clear();
+    let crew = d.crew();
+    assert!(d.ends_too_late(3, &crew, 1), "one tile takes it as long as ten take another");
+    assert!(!d.ends_too_late(1, &crew, 4), "who is not slow and has nothing waits for nobody");
+    assert!(!d.ends_too_late(2, &crew, 4), "who alone is at work does not wait for others");
+}
+
+#[test]
+fn a_node_proves_itself_before_it_gets_much() {
+    let (mut states, mut wire) = (states(2), Wire::new());
+    let mut d = dispatcher(&mut states, 3200, FIXED);
+    let mut counts = Vec::new();
+    for round in 0..8 {
+        d.poll(&mut wire, round);
+        counts.extend(wire.take().iter().filter(|sent| sent.0 == 1).map(|sent| sent.2));
+        done(&mut d, 1, 1_000, round);
+    }
+    // 4 and 4 at first; then no more than twice what it has done, and a short one behind each long one.
+    assert_eq!(counts, [4, 4, 8, 4, 32, 4, 104, 4, 320]);
+    // Alone, there is nobody to share with.
+    let mut states = super::tests::states(1);
+    let mut d = dispatcher(&mut states, 3200, FIXED);
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 3200, 0)]);
+}
+
+#[test]
+fn only_the_host_begins_and_only_the_oldest_run_is_done() {
+    let (mut states, mut wire) = (states(1), Wire::new());
+    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4) });
+    d.handle(1, &begin(2), 0);
+    assert_eq!(d.tiles, 64);
+    d.poll(&mut wire, 0);
+    let before = d.nodes[1].runs.clone();
+    for (from, first, count) in [(1, 1, 4), (1, 0, 3), (0, 0, 4), (9, 0, 4), (Peer::MAX, 0, 64), (1, u32::MAX, 0)] {
+        d.handle(from, &Message::Done { first, count, nanoseconds: 1 }, 1);
+    }
+    d.handle(77, &HELLO, 0);
+    d.lost(77);
+    assert_eq!(d.nodes[1].runs, before);
+}
