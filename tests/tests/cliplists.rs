@@ -93,6 +93,18 @@ fn check_bundle(
     tally.listed += list.len();
 }
 
+/// Rays at corners of leaves' boxes, from one point: outermost rays then only just touch a box.
+fn corner_rays(random: &mut Random, leaves: &[(u32, u32, Aabb)], origin: Vec3) -> Vec<Ray> {
+    let Aabb { lo, hi } = leaves[random.below(leaves.len())].2;
+    (0..16)
+        .map(|_| {
+            let target = Vec3::from([0, 1, 2].map(|axis| if random.below(2) == 0 { lo[axis] } else { hi[axis] }));
+            let direction = if target == origin { Vec3::X } else { target - origin };
+            Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
+        })
+        .collect()
+}
+
 fn check(name: &str, model: &Model, camera: bool) {
     let midpoints = Rule::Midpoint(midpoint::Settings { depth_max: 18, objects_max: 12 });
     let (_, scale) = Source::new(model).unwrap();
@@ -113,10 +125,14 @@ fn check(name: &str, model: &Model, camera: bool) {
         let pages = packed.open().unwrap();
         let scene = pages.resident();
         let leaves = leaves(&scene);
-        for (i, rays) in bundles.iter().enumerate() {
+        let corners = (0..300).map(|_| {
+            let origin = close_rays(&mut random, extent, 1)[0].origin;
+            corner_rays(&mut random, &leaves, origin)
+        });
+        for (i, rays) in bundles.iter().cloned().chain(corners).enumerate() {
             for kernels in [Kernels::Portable, Kernels::detect()] {
                 let what = format!("{name} {settings:?} {kernels:?} bundle {i} of {} rays", rays.len());
-                check_bundle(&what, kernels, &scene, &leaves, packed.magnitude, rays, &mut tally);
+                check_bundle(&what, kernels, &scene, &leaves, packed.magnitude, &rays, &mut tally);
             }
         }
     }

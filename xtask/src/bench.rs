@@ -75,6 +75,9 @@ pub fn run(bench: &Bench) -> anyhow::Result<ExitCode> {
     }
     let tools = Tools::find();
     let workspace = Workspace::load(&tools)?;
+    if let Some(note) = busy_note() {
+        println!("{note}");
+    }
     let bed = Bed { hybray: Hybray::build(&tools, &workspace)?, folder: workspace.target.join("bench") };
     fs::create_dir_all(&bed.folder).with_context(|| format!("{}: no folder can be made", bed.folder.display()))?;
     let found = match bench {
@@ -88,6 +91,17 @@ pub fn run(bench: &Bench) -> anyhow::Result<ExitCode> {
     }
     found.wrong.iter().for_each(|line| println!("WRONG: {line}"));
     Ok(if found.wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Says that others are at work, as far as the system tells: its load average over the last minute. Asked before the
+/// build, which would be found here too.
+fn busy_note() -> Option<String> {
+    let text = fs::read_to_string("/proc/loadavg").ok()?;
+    let load: f64 = text.split_whitespace().next()?.parse().ok()?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let note =
+        format!("note: other programs are at work (load {load:.1} on {cores} cores), so clocks will tell little");
+    (load > 0.2 * cores as f64).then_some(note)
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::scenes::{mixed, table};
-use common::{Rule, Shapes, build, cut_tree, depth, rays, tree, verify};
+use common::{Rule, Shapes, build, cells, cut_tree, depth, rays, tree, verify};
 use hybray_bintree::{BINARY_DEPTH_MAX, midpoint, sah};
 use hybray_scene::BLOCK;
 
@@ -66,7 +66,7 @@ fn check_binary(name: &str, shapes: &Shapes, rule: Rule) -> common::Tree {
 #[test]
 fn presets_times_scenes() {
     for (name, shapes) in table() {
-        let rays = rays(&shapes, 160, name.len() as u64);
+        let rays = rays(&shapes, 240, name.len() as u64);
         let hits = rays.iter().filter(|(_, found)| found.is_hit()).count();
         assert!(hits > 0 || name.contains("denormals") || name.contains("points"), "{name}: the rays hit nothing");
         for rule in presets() {
@@ -74,6 +74,27 @@ fn presets_times_scenes() {
             for page_bytes in [4096, 65_536] {
                 let built = cut_tree(&shapes, &tree, page_bytes).unwrap();
                 verify(&format!("{name} {rule:?} {page_bytes}"), &built, shapes.all.len(), &rays);
+            }
+        }
+    }
+}
+
+/// The rule of the 1995 tree, and PyraClip's contract: an object stands in every cell that its box touches, with the part
+/// of its box that is there.
+#[test]
+fn cells_hold_what_touches_them() {
+    for (name, shapes) in table() {
+        let items = shapes.items();
+        for (depth_max, objects_max) in [(18, 12), (9, 2)] {
+            let tree = cells(&shapes, midpoint::Settings { depth_max, objects_max }, 30);
+            for cell in tree.nodes.iter().filter(|n| n.is_leaf()) {
+                let held = &tree.items[cell.first as usize..][..cell.count as usize];
+                let touching = items.iter().filter(|item| item.aabb().overlaps(&cell.aabb)).count();
+                assert_eq!(held.len(), touching, "{name}: {:?}", cell.aabb);
+                for item in held {
+                    let part = items[item.id as usize].aabb().intersection(&cell.aabb);
+                    assert_eq!(item.aabb(), part, "{name}");
+                }
             }
         }
     }

@@ -39,7 +39,7 @@ pub struct Header {
     pub normals: u32,
     /// Materials: a `u16` for each lane and cone in slot order, or one for all.
     pub materials: u32,
-    /// Greatest and least corner of everything in the page.
+    /// Least corner of everything in the page.
     pub lo: [f32; 3],
     /// Greatest corner.
     pub hi: [f32; 3],

@@ -44,7 +44,7 @@ impl Step {
     #[must_use]
     #[inline]
     pub fn fix(&self, radiance: f32) -> Fixed {
-        if !(radiance >= 0.0 && radiance < f32::INFINITY) {
+        if !(0.0..f32::INFINITY).contains(&radiance) {
             return Fixed::Refused;
         }
         let steps = f64::from(radiance) * self.scale + 0.5;

@@ -29,3 +29,8 @@ pub(crate) fn send(link: &mut dyn Link, to: Peer, message: &Message) -> bool {
         encode(message, room, |_| {}).expect("the room for a message is enough for any")
     })
 }
+
+/// The README's sample is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

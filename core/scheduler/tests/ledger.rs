@@ -68,10 +68,9 @@ fn rays(map: &TileMap, tile: u32, samples: u16, rng: &mut Rng) -> Vec<Ended> {
     for number in 0..place.pixels() {
         let (x, y) = (place.x + number as u32 % place.width, place.y + number as u32 / place.width);
         let pixel = y * map.width() + x;
-        let mut open: Vec<(u64, u32)> =
-            (0..u32::from(samples)).map(|s| (id::primary_id(SEED, pixel, s), 1)).collect();
+        let mut open: Vec<(u64, u32)> = (0..u32::from(samples)).map(|s| (id::primary_id(SEED, pixel, s), 1)).collect();
         while let Some((ray, depth)) = open.pop() {
-            let children = if depth < 6 && rng.one_in(3) { rng.below(4) as u32 } else { 0 };
+            let children = if depth < 6 { rng.pick(&[0, 0, 0, 0, 1, 2, 3]) } else { 0 };
             let mut entry = ray.wrapping_neg();
             for branch in 1..=children {
                 let child = id::child_id(ray, branch);

@@ -46,7 +46,7 @@ impl Walker<'_> {
             return if blocked { [0.0; 3] } else { contribution };
         }
         let mut ray = *ray;
-        for _ in 0..SHADOW_CHAIN_MAX {
+        for _ in 0..=SHADOW_CHAIN_MAX {
             let hit = self.nearest(scene, &ray);
             if !hit.candidate.is_hit() {
                 return contribution;

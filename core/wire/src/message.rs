@@ -110,12 +110,12 @@ pub enum Message {
         /// Sum of the ledger entries of the rays that ended.
         entry: u64,
     },
-    /// Film to dispatcher: a tile is finished. Host to dispatcher and nodes, with `tile` at `u32::MAX`: all are.
+    /// Dispatcher to node: nothing is left to give out, report to the host. `tile` is `u32::MAX`.
     Finished {
         /// The tile.
         tile: u32,
     },
-    /// Film to dispatcher: give this tile out again.
+    /// Film to dispatcher: give this tile out again. After the last one comes one with `tile` at `u32::MAX`.
     Again {
         /// The tile.
         tile: u32,

@@ -67,7 +67,7 @@ pub struct RayRecord {
 pub struct ShadowRecord {
     /// Where it starts, internal units.
     pub origin: [f32; 3],
-    /// Towards the light.
+    /// Towards the light: the whole way, not of unit length, for lights at a place.
     pub direction: [f32; 3],
     /// End of the interval, just before the light.
     pub t_max: f32,

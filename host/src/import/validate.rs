@@ -14,7 +14,7 @@ use hybray_shading::{Light, LightKind, Material};
 pub const PRIMITIVES_MAX: u64 = (1 << 31) - 1;
 
 /// Width and height that a picture may have, pixels.
-pub const SIZE_MAX: u32 = 65_536;
+pub const SIZE_MAX: u32 = hybray_wire::TileMap::SIDE_MAX;
 
 /// What is wrong, and what to do.
 pub(crate) type Complaint = (String, String);

@@ -97,7 +97,7 @@ fn films() {
         "--size 40x40 --spp 2 --filter box",
         "--size 40x40 --spp 2 --filter gaussian",
         "--size 41x40 --spp 2 --filter tent",
-        "--size 40x40 --spp 2 --filter tent --cutoff 1",
+        "--size 40x40 --spp 2 --filter tent --cutoff 0.3",
     ] {
         let film = report(other)["film"].clone();
         assert!(!films.contains(&film), "{other}: a picture that there was before");

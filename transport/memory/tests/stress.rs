@@ -39,9 +39,7 @@ fn everybody_talks(sleep: bool) {
                 let mut heard = [0u64; PEERS as usize];
                 let mut lost = [false; PEERS as usize];
                 let mut turns = 0u64;
-                while sent != [FRAMES; PEERS as usize]
-                    || !(0..usize::from(PEERS)).all(|peer| heard[peer] == FRAMES)
-                {
+                while sent != [FRAMES; PEERS as usize] || !(0..usize::from(PEERS)).all(|peer| heard[peer] == FRAMES) {
                     let mut busy = false;
                     for to in 0..PEERS {
                         let next = &mut sent[usize::from(to)];
@@ -50,7 +48,10 @@ fn everybody_talks(sleep: bool) {
                         if *next < FRAMES && send(&mut link, to, &frame(me, to, *next)) {
                             *next += 1;
                             busy = true;
-                            assert!(count(me, to).load(Ordering::SeqCst) <= i64::from(ROOM) + 1, "more than there is room for");
+                            assert!(
+                                count(me, to).load(Ordering::SeqCst) <= i64::from(ROOM) + 1,
+                                "more than there is room for"
+                            );
                         } else {
                             count(me, to).fetch_sub(1, Ordering::SeqCst);
                         }
@@ -70,7 +71,7 @@ fn everybody_talks(sleep: bool) {
                         }
                     });
                     turns += 1;
-                    if sleep && me % 2 == 0 && turns % 500 == 0 {
+                    if sleep && me % 2 == 0 && turns.is_multiple_of(500) {
                         thread::sleep(Duration::from_micros(200));
                     }
                     if !busy {

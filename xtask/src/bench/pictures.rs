@@ -9,16 +9,18 @@
 //! - *shadows*: every surface white, the lights red, green and blue and a thousand times too bright, so that a channel
 //!   says whether its light arrives.
 //!
-//! The last two are masks, in which a pixel is either right or wrong; their floor is [`FLOOR`].
+//! The last two are masks, in which a pixel is either right or wrong; their floor is [`PERCENT_MIN`].
 
 use clap::Args;
 
 use super::compare::{Comparison, Pixels};
+use super::hybray::Report;
 use super::pairs::{Spread, alternate};
-use super::{Bed, Common, Found, Table, povray, write};
+use super::table::{Figures, Table};
+use super::{Bed, Common, Found, povray, write};
 
-/// Least share of a mask's pixels that has to agree.
-const FLOOR: f64 = 0.99;
+/// How many of a hundred pixels of a mask have to agree.
+const PERCENT_MIN: f64 = 99.0;
 
 /// Settings of every picture that is timed.
 const SETTINGS: [&str; 6] = ["--spp", "1", "--depth", "5", "--cutoff", "0"];
@@ -60,33 +62,38 @@ fn one(bed: &Bed, options: &Options, scene: &str, size: [u32; 2], found: &mut Fo
     let whole = Subject { bed, options, scene, name: scene.replace(':', "-"), settings: &SETTINGS, size };
     whole.convert()?;
     let pairs = alternate(scene, options.runs, || whole.ours(), || whole.theirs())?;
-    let mut figures = vec![("scene", scene.to_owned()), ("threads", options.threads.to_string())];
-    let seconds = |of: &dyn Fn(&(_, _)) -> f64| Spread::of(pairs.iter().map(of)).to_string();
-    figures.push(("hybray, trace s", seconds(&|(ours, _)| ours.seconds.trace)));
-    figures.push(("hybray, busy s", seconds(&|(ours, _)| ours.busy_seconds())));
-    figures.push(("povray, trace s", seconds(&|(_, theirs)| theirs.trace_seconds)));
-    figures.push(("povray, CPU s", seconds(&|(_, theirs)| theirs.busy_seconds)));
-    figures.push(("hybray / povray", seconds(&|(ours, theirs)| ours.seconds.trace / theirs.trace_seconds)));
+    let seconds = |of: &dyn Fn(&Pair) -> f64| Spread::of(pairs.iter().map(of)).into();
+    let mut figures: Figures = vec![
+        ("scene", scene.to_owned().into()),
+        ("threads", u64::from(options.threads).into()),
+        ("hybray, trace s", seconds(&|(ours, _)| ours.seconds.trace)),
+        ("hybray, busy s", seconds(&|(ours, _)| ours.busy_seconds())),
+        ("povray, trace s", seconds(&|(_, theirs)| theirs.trace_seconds)),
+        ("povray, CPU s", seconds(&|(_, theirs)| theirs.busy_seconds)),
+        ("hybray / povray", seconds(&|(ours, theirs)| ours.seconds.trace / theirs.trace_seconds)),
+    ];
     if let Some((ours, theirs)) = pairs.first() {
-        figures.push(("hybray, primary rays", ours.rays.primary.to_string()));
-        figures.push(("hybray, mirrored rays", ours.rays.secondary.to_string()));
-        figures.push(("hybray, shadow rays", ours.rays.shadow.to_string()));
-        figures.push(("povray, rays", theirs.rays.to_string()));
-        figures.push(("povray, shadow rays", theirs.shadow_rays.to_string()));
+        figures.push(("hybray, primary rays", ours.rays.primary.into()));
+        figures.push(("hybray, mirrored rays", ours.rays.secondary.into()));
+        figures.push(("hybray, shadow rays", ours.rays.shadow.into()));
+        figures.push(("povray, rays", theirs.rays.into()));
+        figures.push(("povray, shadow rays", theirs.shadow_rays.into()));
     }
-    let mut share = |what: &'static str, is_mask: bool, comparison: &Comparison| {
-        if is_mask && comparison.share() < FLOOR {
-            let percent = 100.0 * comparison.share();
-            found.wrong.push(format!("{scene}: {what} for {percent:.3} % of the pixels, and not for 99"));
+    let mut agree = |[share, worst]: [&'static str; 2], is_mask: bool, comparison: &Comparison| {
+        let percent = 100.0 * comparison.share();
+        if is_mask && percent < PERCENT_MIN {
+            let line = format!("{scene}: {share} is {percent:.3}, and ought to be {PERCENT_MIN} at least");
+            found.wrong.push(line);
         }
         let (by, x, y) = comparison.worst;
-        figures.push((what, format!("{:.4} % (worst {by} at {x}, {y})", 100.0 * comparison.share())));
+        figures.push((share, format!("{percent:.4}").into()));
+        figures.push((worst, format!("{by} at {x} {y}").into()));
     };
-    share("whole picture agrees", false, &whole.compare()?);
+    agree(["whole picture agrees, %", "whole picture, worst pixel"], false, &whole.compare()?);
     for (what, kind, text, is_mask) in [
-        ("picture of depth 1 agrees", "direct", DIRECT, false),
-        ("silhouettes agree", "silhouettes", SILHOUETTES, true),
-        ("shadows agree", "shadows", SHADOWS, true),
+        (["depth 1 agrees, %", "depth 1, worst pixel"], "direct", DIRECT, false),
+        (["silhouettes agree, %", "silhouettes, worst pixel"], "silhouettes", SILHOUETTES, true),
+        (["shadows agree, %", "shadows, worst pixel"], "shadows", SHADOWS, true),
     ] {
         eprintln!("{scene}: {kind}");
         let name = format!("{}-{kind}", whole.name);
@@ -97,11 +104,14 @@ fn one(bed: &Bed, options: &Options, scene: &str, size: [u32; 2], found: &mut Fo
         mask.convert()?;
         mask.ours()?;
         mask.theirs()?;
-        share(what, is_mask, &mask.compare()?);
+        agree(what, is_mask, &mask.compare()?);
     }
     found.table.add(figures);
     Ok(())
 }
+
+/// What one run of each came to.
+type Pair = (Report, povray::Statistics);
 
 /// A scene that both programs draw.
 struct Subject<'a> {
@@ -128,7 +138,7 @@ impl Subject<'_> {
         self.options.pin.then_some(self.options.threads)
     }
 
-    fn ours(&self) -> anyhow::Result<super::hybray::Report> {
+    fn ours(&self) -> anyhow::Result<Report> {
         let nodes = self.options.threads.to_string();
         let settings = [self.settings, &["--nodes", &nodes]].concat();
         let picture = self.bed.folder.join(self.file("hybray.png"));

@@ -5,8 +5,9 @@
 
 use clap::Args;
 
-use super::hybray::Report;
-use super::{Bed, Common, Found, Table, write};
+use super::hybray::{Counts, Report};
+use super::table::{Figures, Table};
+use super::{Bed, Common, Found, write};
 
 /// `cargo xtask bench scale`.
 #[derive(Args)]
@@ -62,29 +63,32 @@ file = "SCENE"
 material = "shining"
 "#;
 
-fn figures(scene: &str, lit: &Report, shining: &Report) -> Vec<(&'static str, String)> {
-    let each = |bytes: f64| format!("{:.1}", bytes / lit.counts.triangles as f64);
-    let walk = |report: &Report| {
-        let rays = report.rays.sum() as f64;
-        let [nodes, blocks, pages] = [report.counts.walk_nodes, report.counts.walk_blocks, report.counts.walk_pages]
-            .map(|count| count as f64 / rays);
-        format!("{nodes:.3} / {blocks:.3} / {pages:.3}")
+fn figures(scene: &str, lit: &Report, shining: &Report) -> Figures {
+    let triangles = lit.counts.triangles;
+    let each = |sum: f64| format!("{:.1}", sum / triangles as f64).into();
+    let seconds = |seconds: f64| format!("{seconds:.3}").into();
+    let walked = |report: &Report, of: fn(&Counts) -> u64| {
+        format!("{:.3}", of(&report.counts) as f64 / report.rays.sum() as f64).into()
     };
     let peak = lit.memory.peak_bytes_per_primitive;
     vec![
-        ("scene", scene.to_owned()),
-        ("triangles", lit.counts.triangles.to_string()),
-        ("pages", lit.counts.pages.to_string()),
-        ("import, s", format!("{:.3}", lit.seconds.import)),
-        ("build, s", format!("{:.3}", lit.seconds.build)),
+        ("scene", scene.to_owned().into()),
+        ("triangles", triangles.into()),
+        ("pages", lit.counts.pages.into()),
+        ("import, s", seconds(lit.seconds.import)),
+        ("build, s", seconds(lit.seconds.build)),
         ("build, ns a triangle", each(lit.seconds.build * 1e9)),
-        ("trace, s", format!("{:.3}", lit.seconds.trace)),
-        ("rays", lit.rays.sum().to_string()),
-        ("nodes / blocks / pages walked a ray", walk(lit)),
         ("bytes of pages a triangle", each(lit.memory.page_bytes as f64)),
-        ("bytes at the peak a triangle", peak.map_or("not known".to_owned(), |bytes| format!("{bytes:.1}"))),
-        ("primary ray, ns", format!("{:.0}", shining.seconds.trace * 1e9 / shining.rays.primary as f64)),
-        ("primary ray, nodes / blocks / pages", walk(shining)),
+        ("bytes at the peak a triangle", peak.map_or("not known".to_owned(), |bytes| format!("{bytes:.1}")).into()),
+        ("trace, s", seconds(lit.seconds.trace)),
+        ("rays", lit.rays.sum().into()),
+        ("nodes walked a ray", walked(lit, |c| c.walk_nodes)),
+        ("blocks walked a ray", walked(lit, |c| c.walk_blocks)),
+        ("pages walked a ray", walked(lit, |c| c.walk_pages)),
+        ("primary ray, ns", format!("{:.0}", shining.seconds.trace * 1e9 / shining.rays.primary as f64).into()),
+        ("nodes walked a primary ray", walked(shining, |c| c.walk_nodes)),
+        ("blocks walked a primary ray", walked(shining, |c| c.walk_blocks)),
+        ("pages walked a primary ray", walked(shining, |c| c.walk_pages)),
     ]
 }
 

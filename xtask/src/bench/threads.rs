@@ -7,7 +7,8 @@ use clap::Args;
 
 use super::hybray::Report;
 use super::pairs::{Spread, alternate};
-use super::{Bed, Common, Found, Table};
+use super::table::{Figures, Table};
+use super::{Bed, Common, Found};
 
 /// Time of two nodes over that of one; half is perfect.
 const GOAL: f64 = 0.55;
@@ -43,23 +44,23 @@ pub fn run(bed: &Bed, options: &Options) -> anyhow::Result<Found> {
     Ok(found)
 }
 
-fn figures(scene: &str, samples: &str, side: u32, pairs: &[(Report, Report)]) -> Vec<(&'static str, String)> {
+fn figures(scene: &str, samples: &str, side: u32, pairs: &[(Report, Report)]) -> Figures {
     let spread = |of: &dyn Fn(&Report, &Report) -> f64| Spread::of(pairs.iter().map(|(one, two)| of(one, two)));
     let busy = |report: &Report, node: usize| report.nodes.get(node).map_or(f64::NAN, |node| node.busy_seconds);
     let ratio = spread(&|one, two| two.seconds.trace / one.seconds.trace);
     let verdict = if ratio.median <= GOAL { "kept" } else { "missed" };
     vec![
-        ("scene", scene.to_owned()),
-        ("picture", format!("{side} x {side}, {samples} a pixel")),
-        ("rays", pairs.first().map_or(0, |(one, _)| one.rays.sum()).to_string()),
-        ("one node, trace s", spread(&|one, _| one.seconds.trace).to_string()),
-        ("one node, busy s", spread(&|one, _| busy(one, 0)).to_string()),
-        ("one node, busy / total", spread(&|one, _| one.busy_share()).to_string()),
-        ("two nodes, trace s", spread(&|_, two| two.seconds.trace).to_string()),
-        ("two nodes, busy s of the first", spread(&|_, two| busy(two, 0)).to_string()),
-        ("two nodes, busy s of the second", spread(&|_, two| busy(two, 1)).to_string()),
-        ("two nodes, busy / total", spread(&|_, two| two.busy_share()).to_string()),
-        ("two / one", ratio.to_string()),
-        ("goal", format!("{GOAL} {verdict}")),
+        ("scene", scene.to_owned().into()),
+        ("picture", format!("{side} x {side}, {samples} a pixel").into()),
+        ("rays", pairs.first().map_or(0, |(one, _)| one.rays.sum()).into()),
+        ("one node, trace s", spread(&|one, _| one.seconds.trace).into()),
+        ("one node, busy s", spread(&|one, _| busy(one, 0)).into()),
+        ("one node, busy / total", spread(&|one, _| one.busy_share()).into()),
+        ("two nodes, trace s", spread(&|_, two| two.seconds.trace).into()),
+        ("two nodes, busy s of the first", spread(&|_, two| busy(two, 0)).into()),
+        ("two nodes, busy s of the second", spread(&|_, two| busy(two, 1)).into()),
+        ("two nodes, busy / total", spread(&|_, two| two.busy_share()).into()),
+        ("two / one", ratio.into()),
+        ("goal", format!("{GOAL} {verdict}").into()),
     ]
 }

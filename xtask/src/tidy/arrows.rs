@@ -71,11 +71,14 @@ fn show((rank, step): Rank) -> String {
 
 /// The folders of a set of crates that use each other round and round, or of some that lead there; none without a circle.
 ///
-/// Crates that use nobody are taken away until none is left to take; what remains holds a circle.
+/// Crates that use nobody are taken away until none is left to take; what remains holds a circle. A crate whose tests
+/// want its own features depends on itself for them, and that is none.
 fn circle(crates: &[Member]) -> Option<Vec<&str>> {
     let mut left: BTreeMap<&str, &Member> = crates.iter().map(|member| (member.name.as_str(), member)).collect();
     loop {
-        let is_free = |member: &Member| member.uses.iter().all(|arrow| !left.contains_key(arrow.name.as_str()));
+        let is_free = |member: &Member| {
+            member.uses.iter().all(|arrow| arrow.name == member.name || !left.contains_key(arrow.name.as_str()))
+        };
         let free: BTreeSet<_> = left.values().filter(|member| is_free(member)).map(|m| m.name.as_str()).collect();
         if free.is_empty() {
             break;
@@ -132,7 +135,7 @@ mod tests {
             &[member("core/wire", &["dev:scene"]), member("core/scene", &["dev:wire"]), member("core/arena", &[])],
             &["Cargo.toml: crates in a circle: core/scene, core/wire"],
         );
-        check_house(&[member("core/wire", &["dev:wire"])], &["Cargo.toml: crates in a circle: core/wire"]);
+        check_house(&[member("core/wire", &["dev:wire"])], &[]);
     }
 
     #[test]

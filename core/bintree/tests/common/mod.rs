@@ -100,7 +100,7 @@ impl Primitives for Shapes {
         (id % u32::from(self.materials)) as u16
     }
     fn normals(&self, id: u32) -> Option<[u32; 3]> {
-        (self.smooth && id % 2 == 0).then_some([1, 2, 3])
+        (self.smooth && id.is_multiple_of(2)).then_some([1, 2, 3])
     }
 }
 
@@ -119,28 +119,35 @@ pub struct Tree {
 }
 
 pub fn tree(shapes: &Shapes, rule: Rule) -> Tree {
-    let mut items = shapes.items();
     match rule {
         Rule::Sah(settings) => {
+            let mut items = shapes.items();
             let mut nodes = vec![BinaryNode::EMPTY; sah::nodes_for(items.len())];
             let used = sah::build(&mut items, &mut nodes, &settings);
             nodes.truncate(used);
             Tree { nodes, items }
         }
         Rule::Midpoint(settings, room) => {
-            let count = items.len();
-            let Some(&first) = items.first() else { return Tree { nodes: vec![], items } };
-            items.resize(count * room + 64, first);
-            let mut leaves = items.clone();
-            let mut nodes = vec![BinaryNode::EMPTY; 2 * items.len()];
-            let built = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &settings);
-            let (used, held) = (built.nodes.len(), built.items.len());
-            nodes.truncate(used);
-            leaves.truncate(held);
-            midpoint::tighten(&mut nodes, &leaves);
-            Tree { nodes, items: leaves }
+            let mut tree = cells(shapes, settings, room);
+            midpoint::tighten(&mut tree.nodes, &tree.items);
+            tree
         }
     }
+}
+
+/// A midpoint tree whose nodes are still cells.
+pub fn cells(shapes: &Shapes, settings: midpoint::Settings, room: usize) -> Tree {
+    let mut items = shapes.items();
+    let count = items.len();
+    let Some(&first) = items.first() else { return Tree { nodes: vec![], items } };
+    items.resize(count * room + 64, first);
+    let mut leaves = items.clone();
+    let mut nodes = vec![BinaryNode::EMPTY; 2 * items.len()];
+    let built = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &settings);
+    let (used, held) = (built.nodes.len(), built.items.len());
+    nodes.truncate(used);
+    leaves.truncate(held);
+    Tree { nodes, items: leaves }
 }
 
 /// Pages and directory.
@@ -160,6 +167,8 @@ pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built
         Cut::Page(lines) => {
             above.page(aabb, pages.len() as u32);
             let header: &Header = bytemuck::from_bytes(&lines[0].0);
+            let bytes: &[u8] = bytemuck::cast_slice(lines);
+            assert!(bytes[header.bytes as usize..].iter().all(|&b| b == 0), "padded with zeros");
             entries.push(PageEntry { bytes: header.bytes, owner: 0, kind: 0 });
             pages.push(lines.to_vec());
         }
@@ -236,7 +245,8 @@ pub fn rays(shapes: &Shapes, count: usize, seed: u64) -> Vec<(Ray, Candidate)> {
                 direction = Vec3::Z;
             }
             let t_max = if i % 5 == 0 { 1.0 } else { f32::INFINITY };
-            let ray = Ray { origin, direction, t_min: 0.0, t_max };
+            let t_min = if i % 7 == 0 { 0.5 } else { 0.0 };
+            let ray = Ray { origin, direction, t_min, t_max };
             let found = shapes.brute_force(&ray);
             (ray, found)
         })

@@ -84,7 +84,8 @@ impl Toy {
         nodes.truncate(used);
         let entries = vec![PageEntry { bytes: 64 * page.len() as u32, owner: 0, kind: 0 }];
         let matt = |diffuse| Material { diffuse, ambient: diffuse, ..Material::MATT };
-        let shiny = Material { specular: [0.6; 3], exponent: 40.0, highlight: Highlight::Phong as u32, ..matt([0.1; 3]) };
+        let shiny =
+            Material { specular: [0.6; 3], exponent: 40.0, highlight: Highlight::Phong as u32, ..matt([0.1; 3]) };
         let materials = vec![
             matt([0.5, 0.55, 0.4]),
             Material { mirror: [0.8, 0.8, 0.85], ..shiny },
@@ -115,7 +116,7 @@ impl Toy {
                 distance_scale: 1.0,
                 shadow_rays: spawn::shadow_rays(&self.lights),
             },
-            background: [0.3, 0.4, 0.6],
+            background: [0.02, 0.03, 0.06],
             magnitude: 100.0,
             transmits: true,
         }
@@ -135,7 +136,7 @@ impl Toy {
             eye: [0.0, 1.5, -4.5],
             target: [0.0, 0.5, 0.0],
             up: [0.0, 1.0, 0.0],
-            fov_y_degrees: 40.0,
+            fov_y_degrees: 26.0,
             hither: 0.0,
         }
     }

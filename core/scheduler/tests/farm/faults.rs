@@ -3,7 +3,7 @@
 use crate::common::Rng;
 use crate::net::Lie;
 use crate::pictures::{Picture, toys, void};
-use crate::toy::Toy;
+use crate::toy::{SCENE_HASH, Toy};
 use crate::world::{Plan, Report, play};
 use crate::{any_plan, each_seed, same_picture};
 use hybray_link::{HOST, Peer};
@@ -62,7 +62,9 @@ fn a_second_loss_is_no_second_fault() {
         plan.dispatcher = 1;
         plan.manner.far_host = true;
         plan.manner.delay_max = 50_000_000;
-        plan.deaths = (2..=plan.speeds.len() as Peer).map(|node| (rng.between(0, 3).min(u64::from(tiles - 1)) as u32, node)).collect();
+        plan.deaths = (2..=plan.speeds.len() as Peer)
+            .map(|node| (rng.between(0, 3).min(u64::from(tiles - 1)) as u32, node))
+            .collect();
         same_picture(picture, &play(&plan, &mut honest)?)
     });
 }
@@ -147,7 +149,7 @@ fn a_doubled_contribution_adds_nothing() {
         let mut rng = Rng(seed);
         let (picture, plan) = plan(&mut rng, 1);
         let report = play(&plan, &mut |_, _, message| match message {
-            Message::Contributions { .. } if rng.one_in(3) => Lie::Double,
+            Message::Contributions { .. } if rng.below(3) == 0 => Lie::Double,
             _ => Lie::No,
         })?;
         same_picture(picture, &report)
@@ -198,10 +200,10 @@ fn a_stranger_ends_the_picture() {
         let mut rng = Rng(seed);
         let (_, mut plan) = plan(&mut rng, 1);
         let peer = rng.between(1, plan.speeds.len() as u64) as Peer;
-        if rng.one_in(2) {
+        if rng.below(2) == 0 {
             plan.stranger = Some(peer);
         } else {
-            plan.injected = vec![(0, peer, HOST, frame(&Message::Hello { version: VERSION + 1, scene: 1 }))];
+            plan.injected = vec![(0, peer, HOST, frame(&Message::Hello { version: VERSION + 1, scene: SCENE_HASH }))];
         }
         let report = play(&plan, &mut honest)?;
         // A picture may be done before the stranger's first word is there.

@@ -75,7 +75,8 @@ impl<'l> Net<'l> {
                 let near = manner.far_host && from != 0 && to != 0;
                 let delay_max = if near { manner.delay_max / 1000 } else { manner.delay_max };
                 let delay_max = if from == to { 0 } else { delay_max };
-                let held_up = manner.held_up.filter(|&(node, _)| (from, to) == (usize::from(node), 0)).map_or(0, |h| h.1);
+                let held_up =
+                    manner.held_up.filter(|&(node, _)| (from, to) == (usize::from(node), 0)).map_or(0, |h| h.1);
                 Pair { delay: held_up + rng.between(0, delay_max), delay_max, ..Pair::default() }
             })
             .collect();

@@ -57,8 +57,7 @@ impl Picture {
             let (x, y) = (pixel % frame.width, pixel / frame.width);
             let mut sink = Pixel { step: Step::new(frame.step_log2), sum: [0; 3], rays: 0 };
             for sample in 0..u32::from(frame.samples) {
-                let offset =
-                    sample_offset(filter, id::pixel_id(frame.seed, pixel), sample, u32::from(frame.samples));
+                let offset = sample_offset(filter, id::pixel_id(frame.seed, pixel), sample, u32::from(frame.samples));
                 let seen = camera.ray(x, y, offset);
                 let ray =
                     Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY };

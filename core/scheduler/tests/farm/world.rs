@@ -2,6 +2,7 @@
 
 use crate::common::Rng;
 use crate::net::{End, Lie, Manner, Net};
+use crate::toy::SCENE_HASH;
 use hybray_geometry::simd::Kernels;
 use hybray_link::{Event, HOST, Link, Peer};
 use hybray_scheduler::{
@@ -254,7 +255,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let mut tiles = vec![TileState::default(); map.len() as usize];
     let mut reports = vec![NodeReport::default(); peers];
     let film = Film::new(&plan.frame, &mut sums, &mut tiles).ok_or("no film")?;
-    let mut master = Master::new(plan.frame, film, &mut reports, 1, plan.dispatcher);
+    let mut master = Master::new(plan.frame, film, &mut reports, SCENE_HASH, plan.dispatcher);
     let mut states = vec![NodeState::default(); peers];
     let (mut host_dispatcher, mut node_dispatcher) = match plan.dispatcher {
         HOST => (Some(Dispatcher::new(&mut states, plan.options)), None),
@@ -264,7 +265,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let mut workers: Vec<Worker<'_, '_>> = (1..)
         .zip(&mut memories)
         .map(|(me, memory)| {
-            let hash = if plan.stranger == Some(me) { 2 } else { 1 };
+            let hash = SCENE_HASH + u64::from(plan.stranger == Some(me));
             Worker {
                 me,
                 node: Node::new(plan.scene, hash, Kernels::Portable, plan.dispatcher, memory),
@@ -299,6 +300,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
         if now > bound {
             let state = workers.iter().map(|w| format!("{}: {:?} in work {}", w.me, w.runs, w.in_work));
             let state: Vec<_> = state.collect();
+            eprintln!("DEBUG {:?}", master.reports());
             return Err(format!("stuck at {:?} with {:?}; {}", master.progress(), master.outcome(), state.join("; ")));
         }
         if turn == 0 {
