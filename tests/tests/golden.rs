@@ -17,20 +17,20 @@ use hybray_tests::{Picture, kernels, scene};
 /// Film of each scene at 48 x 36 pixels, 2 samples each, all else as the scene has it.
 #[rustfmt::skip]
 const GOLDEN: [(&str, u64); 14] = [
-    ("spd:balls:3", 0),
-    ("spd:balls-noground:2", 0),
-    ("spd:gears:2", 0),
-    ("spd:lattice:3", 0),
-    ("spd:mount:4", 0),
-    ("spd:rings:3", 0),
-    ("spd:sombrero:1", 0),
-    ("spd:teapot:5", 0),
-    ("spd:tetra:5", 0),
-    ("spd:tree:7", 0),
-    ("cornell", 0),
-    ("cornell:mirror", 0),
-    ("organic:3000", 0),
-    ("terrain:8000", 0),
+    ("spd:balls:3", 0xb5c0d47373cda50e),
+    ("spd:balls-noground:2", 0xbda0666633f4aa65),
+    ("spd:gears:2", 0x416eb62788a715d8),
+    ("spd:lattice:3", 0x39064772c8f09c5b),
+    ("spd:mount:4", 0xca2d9ac924f34c4f),
+    ("spd:rings:3", 0x033e343b80c4ab3f),
+    ("spd:sombrero:1", 0x8f4bce65bf988c7f),
+    ("spd:teapot:5", 0x58e62dd851ab9e35),
+    ("spd:tetra:5", 0x855d360f2abaffda),
+    ("spd:tree:7", 0xbf0e83618943ba25),
+    ("cornell", 0x0dc1b32788ed96af),
+    ("cornell:mirror", 0x12c3a84313dbc75b),
+    ("organic:3000", 0x92d98d6b3bee65d7),
+    ("terrain:8000", 0xd28850a2ac74b571),
 ];
 
 #[test]

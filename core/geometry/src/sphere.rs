@@ -1,7 +1,7 @@
 //! Spheres: the quadratic of *Ray Tracing Gems*, chapter 7, whose discriminant does not cancel for distant spheres.
 
 use crate::simd::{Lanes, Mask, ONE_LANE};
-use crate::{Aabb, Candidate, LaneRay, RayKernel, SurfacePoint, Vec3, gamma, normalize};
+use crate::{Aabb, Candidate, LaneRay, RayKernel, SurfacePoint, Vec3, gamma};
 
 /// A sphere, hit from outside and inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,26 +61,35 @@ impl Sphere {
         (hit != 0 && found.precedes(best)).then_some(found)
     }
 
-    /// The place of a hit that [`Sphere::hit`] found at `t`: projected back onto the sphere.
+    /// The place of a hit that [`Sphere::hit`] found at `t`: that root of the quadratic again, in `f64`, since whatever is
+    /// off here grows by the distance over the radius at each mirror.
     #[must_use]
     pub fn surface(&self, ray: &RayKernel, t: f32) -> SurfacePoint {
-        let (o, d) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
-        let f = o - self.centre;
-        let normal = normalize(f + d * t);
-        let along = normal * self.radius;
-        // The discriminant's error moves the root by error / (2 root), and by no more than its own root.
+        let (o, d) = (Vec3::from_array(ray.origin).as_dvec3(), Vec3::from_array(ray.direction).as_dvec3());
+        let radius = f64::from(self.radius);
+        let f = o - self.centre.as_dvec3();
         let a = d.dot(d);
-        let nearest = f + d * (-f.dot(d) / a);
-        let discriminant = self.radius * self.radius - nearest.dot(nearest);
-        let reach = self.radius + gamma(4) * f.length();
-        let error = gamma(10) * reach * reach + 2.0 * gamma(6) * f.length() * reach;
-        let moved = error / libm::sqrtf(if discriminant > error { discriminant } else { error });
+        let along = -f.dot(d) / a;
+        let nearest = f + d * along;
+        let discriminant = radius * radius - nearest.dot(nearest);
+        let half = libm::sqrt(if discriminant > 0.0 { discriminant / a } else { 0.0 });
+        let root = if f64::from(t) < along { along - half } else { along + half };
+        let point = f + d * root;
+        let normal = (point / libm::sqrt(point.dot(point))).as_vec3();
+        let position = (self.centre.as_dvec3() + normal.as_dvec3() * radius).as_vec3();
+        // A ray that f32 takes to graze the sphere, and that misses it in truth, has no root: the nearest point is meant.
+        let grazing = libm::sqrt(if discriminant < 0.0 { -discriminant / a } else { 0.0 });
+        // What f64 itself is off by: a few roundings of the discriminant's terms, through the root's slope.
+        let noise = 16.0 * f64::EPSILON * (f.dot(f) + radius * radius) / a;
+        let floor = libm::sqrt(noise);
+        let own = noise / if half > floor { half } else { floor } + 8.0 * f64::EPSILON * along.abs();
+        let off = (f64::from(t) - root).abs() + grazing + own;
         SurfacePoint {
             t,
-            t_error: moved / libm::sqrtf(a) + gamma(6) * t.abs(),
-            position: self.centre + along,
             test_error: gamma(12) * self.radius,
-            error: along.abs() * gamma(6) + self.centre.abs() * gamma(2),
+            t_error: (off as f32).next_up() + gamma(2) * t.abs(),
+            position,
+            error: position.abs() * gamma(1) + Vec3::splat(gamma(2) * self.radius),
             normal,
             uv: [0.0; 2],
         }

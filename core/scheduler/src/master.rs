@@ -241,3 +241,6 @@ impl<'m> Master<'m> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -50,6 +50,7 @@ fn any_plan(rng: &mut Rng, picture: &'static Picture) -> Plan<'static> {
             delay_max,
             far_host: rng.below(3) == 0,
             held_up: None,
+            refuses: rng.pick(&[0, 0, 0, 2, 5]),
             wakes_for_room: rng.below(4) != 0,
         },
         costs: &picture.costs,

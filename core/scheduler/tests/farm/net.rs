@@ -21,6 +21,8 @@ struct Pair {
     /// Least time on the way, and what chance may add.
     delay: u64,
     delay_max: u64,
+    /// Something was sent.
+    spoke: bool,
     /// The sender has read that the receiver is lost.
     closed: bool,
 }
@@ -44,6 +46,8 @@ pub struct Manner {
     pub far_host: bool,
     /// What this node sends to the host takes so much longer.
     pub held_up: Option<(Peer, u64)>,
+    /// Once in so many times there is no room although there should be; never, if 0.
+    pub refuses: u64,
     /// A participant that waits is woken by room, not by frames alone.
     pub wakes_for_room: bool,
 }
@@ -158,14 +162,21 @@ impl Link for End<'_, '_> {
 
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
         let (me, now, room) = (self.me, self.now, self.net.manner.room);
+        let refuses = self.net.manner.refuses;
+        let refused = refuses > 0 && self.net.rng.below(refuses) == 0;
         let pair = self.net.pair(me, to);
-        if pair.closed || pair.unread >= room {
+        if pair.closed || pair.unread >= room || refused {
             return false;
         }
         let mut bytes = vec![0xee; bytes_max];
         let used = write(&mut bytes);
         bytes.truncate(used);
         let message = decode(&bytes).expect("machines send messages").message;
+        let pair = self.net.pair(me, to);
+        if to == HOST && me != HOST && !pair.spoke {
+            assert!(matches!(message, Message::Hello { .. }), "node {me} begins with {message:?}");
+            pair.spoke = true;
+        }
         if matches!(message, Message::Tiles { .. }) {
             self.net.first_tiles_at.get_or_insert(now);
         }

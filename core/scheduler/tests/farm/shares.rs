@@ -53,7 +53,8 @@ fn farm(costs: &[u64], speeds: &[u64], options: Options, manner: Manner) -> Repo
     farm_at(HOST, costs, speeds, options, manner)
 }
 
-const NEAR: Manner = Manner { room: 64, delay_max: 50_000, far_host: false, held_up: None, wakes_for_room: true };
+const NEAR: Manner =
+    Manner { room: 64, delay_max: 50_000, far_host: false, held_up: None, refuses: 0, wakes_for_room: true };
 
 /// Work over what all nodes could have done in the time that it took.
 fn efficiency(costs: &[u64], speeds: &[u64], report: &Report) -> f64 {

@@ -288,8 +288,9 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let messages = u64::from(map.len()) + 8 * peers as u64;
     // All work on the slowest node four times over, every message on its own, and some sleep for each: far beyond any
     // schedule that is not stuck.
+    let held_up = plan.manner.held_up.map_or(0, |(_, time)| time);
     let bound = 4 * slowest * plan.costs.iter().sum::<u64>()
-        + 8 * messages * (2 * plan.manner.delay_max + WAIT + TURN)
+        + 8 * messages * (2 * plan.manner.delay_max + held_up + WAIT + TURN)
         + 100 * plan.manner.delay_max;
     let (mut deaths, mut injected) = (plan.deaths.clone(), plan.injected.clone());
     let mut finished_at = None;
@@ -300,7 +301,6 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
         if now > bound {
             let state = workers.iter().map(|w| format!("{}: {:?} in work {}", w.me, w.runs, w.in_work));
             let state: Vec<_> = state.collect();
-            eprintln!("DEBUG {:?}", master.reports());
             return Err(format!("stuck at {:?} with {:?}; {}", master.progress(), master.outcome(), state.join("; ")));
         }
         if turn == 0 {
