@@ -4,6 +4,7 @@
 //! parallel, so that binary nodes and unfinished pages exist only for the chunks in work.
 
 use crate::model::Model;
+use bytemuck::allocation::zeroed_box;
 use hybray_bintree::cut::{self, Cut, CutError, FLAT, Primitives};
 use hybray_bintree::walk::Resident;
 use hybray_bintree::{BinaryNode, Item, midpoint, sah, top};
@@ -73,10 +74,12 @@ pub struct Packed {
 
 const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
 
-/// Adds `bytes` to a hash, eight at a time (FNV-1a over little-endian words, the last one filled up with zeros).
+/// Adds `bytes` and their number to a hash, eight at a time (FNV-1a over little-endian words, the last one filled up with
+/// zeros).
 #[must_use]
 pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
-    bytes.chunks(8).fold(hash, |h, chunk| {
+    let length = (bytes.len() as u64).to_le_bytes();
+    bytes.chunks(8).chain([&length[..]]).fold(hash, |h, chunk| {
         let mut word = [0; 8];
         word[..chunk.len()].copy_from_slice(chunk);
         // The rotation brings what multiplication moves up back down.
@@ -103,14 +106,15 @@ impl Packed {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.entries[..])) as u64
     }
 
-    /// Hash of all pages: equal for equal pages in equal order.
+    /// Hash of directory and pages: equal for equal pages in equal order.
     #[must_use]
     pub fn hash(&self) -> u64 {
         let pages = self.places.par_iter().map(|&(chunk, first, lines)| {
             let lines = &self.chunks[chunk as usize][first as usize..][..lines as usize];
             hash_bytes(HASH_START, bytemuck::cast_slice(lines))
         });
-        pages.collect::<Vec<_>>().iter().fold(HASH_START, |h, page| hash_bytes(h, &page.to_le_bytes()))
+        let hash = pages.collect::<Vec<_>>().iter().fold(HASH_START, |h, page| hash_bytes(h, &page.to_le_bytes()));
+        hash_bytes(hash_bytes(hash, bytemuck::cast_slice(&self.nodes)), bytemuck::cast_slice(&self.entries))
     }
 
     /// How many pages there are.
@@ -174,7 +178,8 @@ impl<'m> Source<'m> {
             .into_par_iter()
             .map(|id| unscaled.aabb(id).1.magnitude())
             .reduce(|| 0.0, |a, b| if a > b { a } else { b });
-        let scale_log2 = if magnitude > 0.0 { -exponent(magnitude) } else { 0 };
+        // Coordinates that f32 can only just hold are brought as far as a power of two can bring them.
+        let scale_log2 = if magnitude > 0.0 { (-exponent(magnitude)).clamp(-126, 126) } else { 0 };
         Ok((Self { scale: libm::ldexpf(1.0, scale_log2), ..unscaled }, scale_log2))
     }
 
@@ -314,7 +319,7 @@ fn surface_area(
     let chunks = parts
         .into_par_iter()
         .map_init(
-            || (Vec::new(), Box::<cut::Scratch>::default()),
+            || (Vec::new(), zeroed_box::<cut::Scratch>()),
             |(nodes, scratch), part| {
                 nodes.resize(sah::nodes_for(part.len()).max(nodes.len()), BinaryNode::EMPTY);
                 let used = sah::build(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
@@ -339,7 +344,7 @@ fn midpoints(
     let tree = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &rule);
     let (used, held) = (tree.nodes.len(), tree.items.len());
     midpoint::tighten(&mut nodes[..used], &leaves[..held]);
-    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, page_bytes, &mut Box::default())?;
+    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, page_bytes, &mut zeroed_box())?;
     let root = BinaryNode { second: 0, ..nodes[0] };
     Ok((vec![root], vec![chunk]))
 }

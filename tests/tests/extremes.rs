@@ -67,13 +67,14 @@ fn powers_of_two_change_nothing() {
 /// functions that two triangles compute alike for the edge that they share. What those decide may be wrong by a rounding,
 /// but never leaves a gap between two triangles.
 struct Exact {
+    /// Corners as seen from the origin of all rays.
     corners: Vec<[f64; 3]>,
     triangles: Vec<[usize; 3]>,
 }
 
 impl Exact {
     /// The mesh, vertices that are the same point being one.
-    fn new(mesh: &Mesh) -> Self {
+    fn new(mesh: &Mesh, origin: [f64; 3]) -> Self {
         let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
         let bits = |i: usize| mesh.positions[i].map(|x| (x + 0.0).to_bits());
         order.sort_by_key(|&i| bits(i));
@@ -82,7 +83,8 @@ impl Exact {
             names[pair[1]] = names[pair[0]] + usize::from(bits(pair[0]) != bits(pair[1]));
         }
         let mut corners = vec![[0.0; 3]; mesh.positions.len()];
-        (0..order.len()).for_each(|i| corners[names[i]] = mesh.positions[i].map(f64::from));
+        let relative = |p: [f32; 3]| [0, 1, 2].map(|axis| f64::from(p[axis]) - origin[axis]);
+        (0..order.len()).for_each(|i| corners[names[i]] = relative(mesh.positions[i]));
         Self { corners, triangles: mesh.triangles.iter().map(|t| t.map(|v| names[v as usize])).collect() }
     }
 
@@ -98,21 +100,17 @@ impl Exact {
         edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).all(|same| same.iter().map(|e| e.2).sum::<i32>() == 0)
     }
 
-    /// How far from `origin` along `direction` the surface is, in lengths of `direction`.
-    fn distance(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<f64> {
-        let relative: Vec<[f64; 3]> = self.corners.iter().map(|p| [0, 1, 2].map(|i| p[i] - origin[i])).collect();
+    /// How far along `direction` the surface is, in lengths of `direction`.
+    fn distance(&self, direction: [f64; 3]) -> Option<f64> {
+        let corners = &self.corners;
         let edge = |a: usize, b: usize| {
-            if a < b {
-                triple(direction, relative[a], relative[b])
-            } else {
-                -triple(direction, relative[b], relative[a])
-            }
+            if a < b { triple(direction, corners[a], corners[b]) } else { -triple(direction, corners[b], corners[a]) }
         };
         let hit = |&[a, b, c]: &[usize; 3]| {
             let weights = [edge(b, c), edge(c, a), edge(a, b)];
             let sum: f64 = weights.iter().sum();
             let inside = weights.iter().all(|&w| w >= 0.0) || weights.iter().all(|&w| w <= 0.0);
-            let along = |corner: usize| dot(direction, relative[corner]) / dot(direction, direction);
+            let along = |corner: usize| dot(direction, corners[corner]) / dot(direction, direction);
             let distance = (weights[0] * along(a) + weights[1] * along(b) + weights[2] * along(c)) / sum;
             (inside && sum != 0.0 && distance > 0.0).then_some(distance)
         };
@@ -141,7 +139,7 @@ fn shifted(mut model: Model, by: Vec3) -> Model {
 /// No primary ray, and no ray at a vertex or an edge's middle, passes through the surface where there is surface all
 /// around.
 fn check_closed(what: &str, model: Model) {
-    let exact = Exact::new(&model.meshes[0]);
+    let exact = Exact::new(&model.meshes[0], model.cameras[0].eye.map(f64::from));
     assert!(exact.is_closed(), "{what}");
     let aims: Vec<Vec3> = {
         let mesh = &model.meshes[0];
@@ -163,14 +161,13 @@ fn check_closed(what: &str, model: Model) {
     // A hundredth of a pixel, seen from the eye.
     let spread = 0.01 * 2.0 * (0.5 * f64::from(model.cameras[0].fov_y_degrees).to_radians()).tan() / 64.0;
     let wide = |v: Vec3, by: f64| v.to_array().map(|x| f64::from(x) * by);
-    let origin = wide(eye, 1.0 / f64::from(unit));
     let (mut inside, mut counts, mut stack) = (0, Counts::default(), Stack::new());
     for ray in &rays {
         let middle = wide(ray.direction, 1.0 / f64::from(ray.direction.length()));
         // How far the surface is at most around here; nothing where it is not all around.
         let reach = (0..27).try_fold(0.0, |farthest: f64, i| {
             let aside = [i % 3, i / 3 % 3, i / 9].map(|step| f64::from(step - 1) * spread);
-            exact.distance(origin, [0, 1, 2].map(|axis| middle[axis] + aside[axis])).map(|d| farthest.max(d))
+            exact.distance([0, 1, 2].map(|axis| middle[axis] + aside[axis])).map(|d| farthest.max(d))
         });
         let Some(reach) = reach else { continue };
         inside += 1;
@@ -243,7 +240,7 @@ fn a_closed_mesh_is_closed_from_within() {
         let pages = prepared.packed.open().unwrap();
         let unit = 2f32.powi(prepared.packed.scale_log2);
         let (mut counts, mut stack) = (Counts::default(), Stack::new());
-        let eye = Vec3::from(by + Vec3::new(0.25, 0.125, -0.25)) * unit;
+        let eye = (by + Vec3::new(0.25, 0.125, -0.25)) * unit;
         let mut directions: Vec<Vec3> = model.meshes[0].positions.iter().map(|&p| Vec3::from(p) * unit - eye).collect();
         for target in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
             let up = if target.y == 0.0 { Vec3::Y } else { Vec3::X };

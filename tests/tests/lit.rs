@@ -78,3 +78,58 @@ fn a_floor_is_lit_wherever_it_lies() {
         }
     }
 }
+
+/// A lamp modelled where its light is stays lit through a pane of glass: the light's end is aimed at anew behind the pane.
+#[test]
+fn a_lamp_shines_through_glass() {
+    let square = |y: f32, half: f32, material: u16, down: bool| Mesh {
+        positions: vec![[-half, y, -half], [half, y, -half], [half, y, half], [-half, y, half]],
+        triangles: if down { vec![[0, 1, 2], [0, 2, 3]] } else { vec![[0, 2, 1], [0, 3, 2]] },
+        material,
+        ..Mesh::default()
+    };
+    let material = |material| NamedMaterial { material, ..NamedMaterial::default() };
+    let mean = |with_lamp: bool| {
+        let mut meshes = vec![square(-2.0, 1.0, 0, false), square(-1.0, 1.0, 1, true)];
+        if with_lamp {
+            meshes.push(square(0.0, 0.05, 2, true));
+        }
+        let model = Model {
+            meshes,
+            materials: vec![
+                material(Material { diffuse: [1.0; 3], ..Material::MATT }),
+                material(Material { diffuse: [0.0; 3], transmission: [1.0; 3], ior: 1.0, ..Material::MATT }),
+                material(Material { diffuse: [0.0; 3], emission: [1.0; 3], ..Material::MATT }),
+            ],
+            lights: vec![Light {
+                kind: LightKind::Rectangle as u32,
+                position: [-0.05, 0.0, -0.05],
+                u: [0.1, 0.0, 0.0],
+                v: [0.0, 0.0, 0.1],
+                colour: [1.0; 3],
+                samples: 4,
+                ..Light::default()
+            }],
+            cameras: vec![CameraSpec {
+                name: "beside".to_owned(),
+                eye: [0.0, -1.5, 0.0],
+                target: [0.0, -2.0, 0.0],
+                up: [1.0, 0.0, 0.0],
+                fov_y_degrees: 60.0,
+                hither: 0.0,
+                size: None,
+            }],
+            ..Model::default()
+        };
+        let prepared = Prepared::new(model, &build::Settings::default()).unwrap();
+        let pages = prepared.packed.open().unwrap();
+        let wanted = Settings { size: Some([16, 16]), spp: Some(1), ..Settings::default() };
+        let frame = prepared.frame(&prepared.cameras[0], &wanted);
+        let farm = Farm { nodes: 1, kernels: kernels(), dispatcher: DispatcherAt::Host, options: Options::default() };
+        let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).unwrap();
+        traced.radiance.iter().map(|r| r[0]).sum::<f32>() / 256.0
+    };
+    let (bare, modelled) = (mean(false), mean(true));
+    assert!(bare > 0.5, "the light lights the floor: {bare}");
+    assert!((modelled - bare).abs() < 1e-3, "{modelled} with the lamp, {bare} without");
+}

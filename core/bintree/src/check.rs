@@ -70,8 +70,9 @@ pub fn check(scene: &Resident<'_>, found: &mut [Coverage], seen: &mut [u32]) -> 
             let inside = match child {
                 Child::Inner(next) => scene.directory.nodes[next as usize].bounds(),
                 Child::Page(page) => {
+                    let view = scene.pages.get(page as usize).ok_or(Fault::Page { page, times: 0 })?;
                     seen[page as usize] += 1;
-                    scene.pages[page as usize].nodes[0].bounds()
+                    view.nodes[0].bounds()
                 }
                 Child::Leaf { .. } | Child::Unused => Aabb::EMPTY,
             };

@@ -32,7 +32,10 @@ const LEAF_BLOCKS: u32 = 4;
 /// Least bytes that a primitive takes in a page.
 const PRIMITIVE_BYTES_MIN: usize = 20;
 
-/// A page under construction: about 340 KB of scratch, so keep one and use it again.
+/// A page under construction: about 340 KB of scratch, so keep one and use it again. All zeros is a good beginning
+/// ([`bytemuck::Zeroable`]): too large for a stack, it is best zeroed where it lies.
+#[derive(Clone, Copy, Zeroable)]
+#[repr(C)]
 pub struct Scratch {
     nodes: [Node; NODES_MAX],
     contents: Contents,
@@ -40,6 +43,8 @@ pub struct Scratch {
 }
 
 /// Primitives of a page, by kind.
+#[derive(Clone, Copy, Zeroable)]
+#[repr(C)]
 struct Contents {
     triangles: [TriangleBlock; TRIANGLES_MAX],
     spheres: [SphereBlock; SPHERES_MAX],
@@ -48,32 +53,6 @@ struct Contents {
     triangle_materials: [u16; TRIANGLES_MAX * BLOCK],
     sphere_materials: [u16; SPHERES_MAX * BLOCK],
     cone_materials: [u16; CONES_MAX],
-}
-
-impl Scratch {
-    /// Zeroed scratch. Large: put it where large things go.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            nodes: [Node::EMPTY; NODES_MAX],
-            contents: Contents {
-                triangles: [Zeroable::zeroed(); TRIANGLES_MAX],
-                spheres: [Zeroable::zeroed(); SPHERES_MAX],
-                cones: [Zeroable::zeroed(); CONES_MAX],
-                normals: [[0; 3]; TRIANGLES_MAX * BLOCK],
-                triangle_materials: [0; TRIANGLES_MAX * BLOCK],
-                sphere_materials: [0; SPHERES_MAX * BLOCK],
-                cone_materials: [0; CONES_MAX],
-            },
-            page: [Line([0; 64]); PAGE_BYTES_MAX / 64],
-        }
-    }
-}
-
-impl Default for Scratch {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 /// A subtree: a node, or a range of a leaf's items that is cut further.

@@ -4,7 +4,9 @@ mod common;
 
 use common::scenes::{mixed, table};
 use common::{Rule, Shapes, build, cells, cut_tree, depth, rays, tree, verify};
+use hybray_bintree::walk::{Counts, Stack, nearest};
 use hybray_bintree::{BINARY_DEPTH_MAX, midpoint, sah};
+use hybray_geometry::simd::Kernels;
 use hybray_scene::BLOCK;
 
 fn presets() -> Vec<Rule> {
@@ -132,4 +134,21 @@ fn trees_stay_compact() {
     let (slots, bytes) = (census.slots as f64 / n, census.bytes as f64 / n);
     eprintln!("{:.2} slots, {:.4} wide nodes and {bytes:.1} bytes a triangle", slots, census.nodes as f64 / n);
     assert!(slots < 1.6 && bytes < 100.0, "{census:?}");
+
+    // Near things first: far ones are then skipped.
+    let (views, mut counts) = (built.views(), Counts::default());
+    let scene = built.resident(&views);
+    let rays = rays(&shapes, 400, 4);
+    for (ray, expected) in &rays {
+        let found = nearest(Kernels::Portable, &scene, ray, &mut Stack::new(), &mut counts);
+        assert_eq!(found.candidate, *expected);
+    }
+    let a_ray = |n: u64| n as f64 / rays.len() as f64;
+    eprintln!(
+        "{:.1} wide nodes, {:.1} blocks, {:.1} pages a ray",
+        a_ray(counts.nodes),
+        a_ray(counts.blocks),
+        a_ray(counts.pages)
+    );
+    assert!(a_ray(counts.nodes) < 25.0, "{counts:?}");
 }

@@ -36,7 +36,7 @@ fn rays_aimed_at_vertices_and_edges_never_leak() {
         let apex = random.vec();
         let ring: Vec<Vec3> = (0..6)
             .map(|i| {
-                let (s, c) = (i as f32 * 1.047_197_5).sin_cos();
+                let (s, c) = (i as f32 * std::f32::consts::FRAC_PI_3).sin_cos();
                 apex + Vec3::new(c, s, -0.3) * (0.5 + 0.4 * random.signed().abs()) + random.vec() * 0.1
             })
             .collect();
@@ -77,25 +77,6 @@ fn a_triangle_hit_agrees_with_f64() {
         }
     }
     assert!(hits > 500, "{hits}");
-}
-
-#[test]
-fn the_distance_lies_in_the_own_box_interval() {
-    let mut random = Random(3);
-    let mut clamped = 0;
-    for _ in 0..50_000 {
-        let mut v = [random.vec(), random.vec(), random.vec()];
-        let x = random.signed();
-        v.iter_mut().for_each(|p| p.x = x);
-        let triangle = Triangle { v };
-        let r = ray(random.vec() * 2.0, random.vec());
-        if let Some(hit) = triangle.hit(&r, 0, &FAR) {
-            let (near, far) = r.slab(&triangle.aabb());
-            assert!(near <= hit.t && hit.t <= far, "{near} {} {far}", hit.t);
-            clamped += usize::from(hit.t == near);
-        }
-    }
-    assert!(clamped > 100, "the rule is exercised: {clamped}");
 }
 
 #[test]

@@ -15,8 +15,8 @@ pub struct Shares {
     pub atomic: u32,
 }
 
-/// The size of the next job: `W / (1 + T (N - 1))`, times the node's relative rate, but never less than an atomic job nor
-/// more than there is.
+/// The size of the next job: `W / (1 + T (N - 1))`, times the node's relative rate, but never less than an atomic job
+/// nor more than there is.
 ///
 /// With T = 1 the picture is cut into N equal parts; with T towards infinity all jobs are atomic.
 #[must_use]

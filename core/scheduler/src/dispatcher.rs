@@ -1,7 +1,11 @@
 //! The dispatcher: hands out runs of tiles (POV||Ray, section 2).
 //!
-//! It needs to know nothing but how many tiles there are, so it can run on a node near the workers (section 2.2). Each node
-//! has its next run before it ends the last. T, the nodes' rates and the least useful run are learned on the way.
+//! It needs to know nothing but how many tiles there are, so it can run on a node near the workers (section 2.2). Each
+//! node has its next run before it ends the last; T, the nodes' rates and the least useful run are learned on the way.
+//!
+//! The rule bounds the imbalance only if no run takes more than T times as long as another, and if nobody holds back
+//! what others could do. So what a node has in hand is kept short: at most twice what it has proven to be able to, a
+//! short run behind a long one, and none behind another where others would be through with it first.
 
 use crate::chunk::{Shares, chunk};
 use crate::master::NO_MORE;
@@ -155,8 +159,8 @@ impl<'m> Dispatcher<'m> {
         }
     }
 
-    /// A tile that the film wants again, or the end of their list. The picture is not idle in between: each node would report
-    /// before all is done, and nobody could tell that report from the next.
+    /// A tile that the film wants again, or the end of their list. The picture is not idle in between: each node would
+    /// report before all is done, and nobody could tell that report from the next.
     fn again(&mut self, tile: u32, epoch: u16) {
         self.nodes.iter_mut().for_each(|node| node.told = false);
         if tile == NO_MORE {
@@ -216,7 +220,7 @@ impl<'m> Dispatcher<'m> {
         })
     }
 
-    /// Least tiles of a run as it is now: as many as take [`OVERHEAD_FACTOR`] times the time of their messages, but few
+    /// Least tiles of a run as it is now: as many as take twice the time of their messages, but few
     /// enough that each node could have several.
     #[must_use]
     pub fn atomic(&self) -> u32 {
@@ -272,8 +276,8 @@ impl<'m> Dispatcher<'m> {
         crew
     }
 
-    /// Whether what is left is better left to others: this node has work, or is slow, and those who are at work would be
-    /// through with it first.
+    /// Whether what is left is better left to others: this node has work, or is slow, and those who are at work would
+    /// be through with it first.
     fn ends_too_late(&self, peer: usize, crew: &Crew, atomic: u32) -> bool {
         let (node, rate) = (&self.nodes[peer], crew.rate(&self.nodes[peer]));
         let left = self.tiles - self.next;
@@ -298,8 +302,8 @@ impl<'m> Dispatcher<'m> {
         let node = &self.nodes[peer];
         let left = self.tiles - self.next;
         let mut count = if node.runs.front().is_some_and(|run| run.count > atomic) {
-            // It has enough to do. What comes behind need only last until the message after it is there: whatever it has
-            // in hand, nobody else can take.
+            // It has enough to do. What comes behind need only last until the message after it is there: whatever it
+            // has in hand, nobody else can take.
             atomic.min(left)
         } else {
             let shares = Shares {

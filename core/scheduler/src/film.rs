@@ -88,8 +88,8 @@ pub struct Film<'m> {
 }
 
 impl<'m> Film<'m> {
-    /// An empty film for `frame`; `None` if the picture has no pixels, or the memory does not fit it: `sums` one a pixel,
-    /// `tiles` one a tile.
+    /// An empty film for `frame`; `None` if the picture has no pixels, or the memory does not fit it: `sums` one a
+    /// pixel, `tiles` one a tile.
     #[must_use]
     pub fn new(frame: &Frame, sums: &'m mut [[u64; 3]], tiles: &'m mut [TileState]) -> Option<Self> {
         let map = TileMap::new(frame.width, frame.height)?;
@@ -138,8 +138,8 @@ impl<'m> Film<'m> {
     }
 
     /// Adds `values` (red, green and blue of each pixel, little-endian steps) and a ledger entry to a tile; returns
-    /// whether that finished it. What comes under an old epoch, or for a finished tile, is dropped; a new epoch empties the
-    /// tile first. Bounded: one tile.
+    /// whether that finished it. What comes under an old epoch, or for a finished tile, is dropped; a new epoch empties
+    /// the tile first. Bounded: one tile.
     ///
     /// # Errors
     /// If there is no such tile: nothing is changed.
@@ -182,7 +182,8 @@ impl<'m> Film<'m> {
         Ok(state.finished)
     }
 
-    /// Empties a tile and debits its primaries, under `epoch`. A finished tile, or none of this picture's, stays as it is.
+    /// Empties a tile and debits its primaries, under `epoch`. A finished tile, or none of this picture's, stays as it
+    /// is.
     pub fn open(&mut self, tile: u32, epoch: u16) {
         if self.tiles.get(tile as usize).is_none_or(|t| t.finished) {
             return;

@@ -1,8 +1,8 @@
 //! Dispatcher, node, ledger and film: state machines and pure functions that know no clock, thread or socket.
 //!
-//! A machine has three verbs. `handle` takes in what arrived; `step` does a bounded amount of work; `poll` sends what the
-//! link has room for, and keeps the rest. Time comes in as nanoseconds. The same machines run on threads, under MPI,
-//! on a board and in the simulator.
+//! A machine has three verbs. `handle` takes in what arrived; `step` does a bounded amount of work; `poll` sends what
+//! the link has room for, and keeps the rest. Time comes in as nanoseconds. The same machines run on threads, under
+//! MPI, on a board and in the simulator.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -221,8 +221,8 @@ impl<'m, 's> Node<'m, 's> {
         self.stage = Stage::Idle;
     }
 
-    /// Traces for a while: at most one bundle of primary rays and some thousand rays of their hits. Returns whether there
-    /// was anything to do. `clock` is asked before and after.
+    /// Traces for a while: at most one bundle of primary rays and some thousand rays of their hits. Returns whether
+    /// there was anything to do. `clock` is asked before and after.
     pub fn step(&mut self, clock: &mut dyn FnMut() -> u64) -> bool {
         let before = clock();
         let worked = match self.stage {
@@ -369,8 +369,8 @@ impl<'m, 's> Node<'m, 's> {
         }
     }
 
-    /// Sends what is finished, and what has to be said. Returns whether anything was sent. Bounded: four tiles and a few
-    /// short messages.
+    /// Sends what is finished, and what has to be said. Returns whether anything was sent. Bounded: four tiles and a
+    /// few short messages.
     pub fn poll(&mut self, link: &mut dyn Link) -> bool {
         let mut sent = false;
         for (i, peer) in [HOST, self.dispatcher].into_iter().enumerate() {
@@ -384,9 +384,10 @@ impl<'m, 's> Node<'m, 's> {
             }
         }
         // The host hears who it is before it hears anything else: a stranger's contributions must not come first.
-        if self.greeted[0] {
-            sent |= self.send_tiles(link);
+        if !self.greeted[0] {
+            return sent;
         }
+        sent |= self.send_tiles(link);
         while let Some(run) = self.done.front() {
             let done = Message::Done { first: run.first, count: run.count, nanoseconds: run.nanoseconds };
             if !send(link, self.dispatcher, &done) {
@@ -447,7 +448,8 @@ impl<'m, 's> Node<'m, 's> {
             if run.done == run.count
                 && let Some(run) = self.runs.pop_front()
             {
-                // There is room: no more runs are taken in than this queue holds, and each is told before the next ends.
+                // There is room: no more runs are taken in than this queue holds, and each is told before the next
+                // ends.
                 let _ = self.done.push_back(run);
             }
         }

@@ -45,7 +45,7 @@ impl Walker<'_> {
             let blocked = walk::occluded(self.kernels, &scene.resident, ray, self.stack, &mut self.counts);
             return if blocked { [0.0; 3] } else { contribution };
         }
-        let mut ray = *ray;
+        let (mut ray, target) = (*ray, ray.origin + ray.direction);
         for _ in 0..=SHADOW_CHAIN_MAX {
             let hit = self.nearest(scene, &ray);
             if !hit.candidate.is_hit() {
@@ -61,7 +61,9 @@ impl Walker<'_> {
             match spawn::pass_through(&scene.shading, &place, contribution) {
                 Some((origin, rest)) => {
                     contribution = rest;
-                    ray = Ray { origin, t_min: 0.0, t_max: ray.t_max - hit.candidate.t, ..ray };
+                    // A light at a place is aimed at anew: the way from here is shorter, and ends just before it as before.
+                    ray.direction = if ray.t_max < f32::INFINITY { target - origin } else { ray.direction };
+                    ray.origin = origin;
                 }
                 None => return [0.0; 3],
             }

@@ -41,11 +41,15 @@ impl TileMap {
     /// Widest and highest picture, pixels.
     pub const SIDE_MAX: u32 = 32_768;
 
+    /// Most pixels of a picture: its sums take 24 bytes each.
+    pub const PIXELS_MAX: u64 = 1 << 28;
+
     /// The tiles of a picture of `width` x `height` pixels; `None` if it has none, or too many.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Option<Self> {
         let fits = |side: u32| (1..=Self::SIDE_MAX).contains(&side);
-        (fits(width) && fits(height)).then(|| Self {
+        let few = u64::from(width) * u64::from(height) <= Self::PIXELS_MAX;
+        (fits(width) && fits(height) && few).then(|| Self {
             width,
             height,
             columns: width.div_ceil(TILE),

@@ -52,7 +52,43 @@ pub(super) fn exr(picture: &Picture, to: &mut (impl Write + Seek)) -> io::Result
         })
 }
 
+/// Keeps a writer's first error: the crate png hands errors on as text, without their kind, and a closed pipe and a full
+/// disk are told apart by that.
+struct Keep<'a> {
+    to: &'a mut dyn Write,
+    error: Option<io::Error>,
+}
+
+impl Keep<'_> {
+    fn keep<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        result.map_err(|error| {
+            let kind = error.kind();
+            if kind != io::ErrorKind::Interrupted {
+                self.error.get_or_insert(error);
+            }
+            kind.into()
+        })
+    }
+}
+
+impl Write for Keep<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.to.write(bytes);
+        self.keep(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.to.flush();
+        self.keep(result)
+    }
+}
+
 fn png(picture: &Picture, exposure: f32, depth: png::BitDepth, to: &mut dyn Write) -> io::Result<()> {
+    let mut keep = Keep { to, error: None };
+    png_rows(picture, exposure, depth, &mut keep).map_err(|error| keep.error.take().unwrap_or(error))
+}
+
+fn png_rows(picture: &Picture, exposure: f32, depth: png::BitDepth, to: &mut dyn Write) -> io::Result<()> {
     let mut encoder = png::Encoder::new(to, picture.width, picture.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(depth);

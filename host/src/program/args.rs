@@ -203,8 +203,11 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     let side_max = hybray_wire::TileMap::SIDE_MAX;
     match parsed {
-        Some(size) if size.iter().all(|s| (1..=side_max).contains(s)) => Ok(size),
-        Some(_) => Err(format!("a picture has 1 to {side_max} columns and rows, such as 640x480")),
+        Some(size) if hybray_wire::TileMap::new(size[0], size[1]).is_some() => Ok(size),
+        Some(_) => Err(format!(
+            "a picture has 1 to {side_max} columns and rows, such as 640x480, and at most {} pixels",
+            hybray_wire::TileMap::PIXELS_MAX
+        )),
         None => Err("give columns and rows, such as 640x480".to_owned()),
     }
 }

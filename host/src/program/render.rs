@@ -66,7 +66,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     show.begin();
-    let traced = trace(&scene, prepared.hash, &frame, &farm, &mut |progress| {
+    let mut traced = trace(&scene, prepared.hash, &frame, &farm, &mut |progress| {
         show.progress(progress);
         !interrupted.load(Ordering::Relaxed)
     })
@@ -83,7 +83,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     }
     prepared.warnings.extend(film_warnings(&traced));
     let rays = total_rays(&traced);
-    output.write(&picture(&frame, &traced), exposure)?;
+    output.write(&picture(&frame, std::mem::take(&mut traced.radiance)), exposure)?;
     let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
     if let Some(json) = json {
         json.write(&report(args, &prepared, &frame, &farm, &traced, seconds))?;
@@ -142,8 +142,8 @@ fn stopped_early(show: &Show) -> Result<End> {
     Ok(End::Interrupted)
 }
 
-fn picture(frame: &Frame, traced: &Traced) -> Picture {
-    Picture { width: frame.width, height: frame.height, rgb: traced.radiance.as_flattened().to_vec() }
+fn picture(frame: &Frame, radiance: Vec<[f32; 3]>) -> Picture {
+    Picture { width: frame.width, height: frame.height, rgb: radiance.into_flattened() }
 }
 
 fn film_warnings(traced: &Traced) -> impl Iterator<Item = String> + use<> {

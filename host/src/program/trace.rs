@@ -75,9 +75,10 @@ pub(super) fn run(args: &TraceArgs) -> Result<End> {
     Ok(End::Done)
 }
 
-fn text(tracer: &mut Tracer<'_>, mut input: impl BufRead, output: &mut impl Write) -> Result<()> {
+fn text(tracer: &mut Tracer<'_>, mut input: BufReader<impl Read>, output: &mut impl Write) -> Result<()> {
     let mut line = String::new();
     for number in 1u64.. {
+        flush_for_who_waits(&input, output)?;
         line.clear();
         let read = input.by_ref().take(LINE_MAX).read_line(&mut line);
         if read.with_context(|| format!("standard input, line {number}: cannot be read as text"))? == 0 {
@@ -108,12 +109,22 @@ fn text(tracer: &mut Tracer<'_>, mut input: impl BufRead, output: &mut impl Writ
     Ok(())
 }
 
-fn binary(tracer: &mut Tracer<'_>, mut input: impl Read, output: &mut impl Write) -> Result<()> {
+/// Sends the answers so far before the next ray has to be waited for: who asks one at a time waits for each.
+fn flush_for_who_waits(input: &BufReader<impl Read>, output: &mut impl Write) -> std::io::Result<()> {
+    if input.buffer().is_empty() { output.flush() } else { Ok(()) }
+}
+
+fn binary(tracer: &mut Tracer<'_>, mut input: BufReader<impl Read>, output: &mut impl Write) -> Result<()> {
     for number in 1u64.. {
+        flush_for_who_waits(&input, output)?;
         let mut bytes = [0; 32];
         let mut filled = 0;
         while filled < bytes.len() {
-            match input.read(&mut bytes[filled..]).context("standard input cannot be read")? {
+            let read = match input.read(&mut bytes[filled..]) {
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+                read => read.context("standard input cannot be read")?,
+            };
+            match read {
                 0 if filled == 0 => return Ok(()),
                 0 => bail!("standard input ends within ray {number}: a ray is 32 bytes"),
                 n => filled += n,

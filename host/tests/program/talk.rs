@@ -92,7 +92,6 @@ fn a_closed_pipe_is_no_error() {
 }
 
 #[test]
-#[ignore = "the crate png makes an error without a kind of it: host/src/picture/encode.rs would have to keep the kind"]
 fn a_closed_pipe_is_no_error_for_a_picture() {
     check_unread(&Folder::new(), "render spd:balls:1 --size 100x100 --spp 1 -q -o -");
 }

@@ -90,8 +90,8 @@ fn a_farm_that_is_stopped_ends() {
     }
 }
 
-/// A page that a directory names and nobody has is a bug, and stops the thread that finds it. The others do not wait for it,
-/// and the caller hears of it.
+/// A page that a directory names and nobody has is a bug, and stops the thread that finds it. The others do not wait
+/// for it, and the caller hears of it.
 #[test]
 fn a_thread_that_panics_is_told_and_does_not_hang_the_rest() {
     let quiet = std::panic::take_hook();

@@ -1,8 +1,8 @@
 //! The link between threads of one process: crossbeam channels.
 //!
 //! Each participant has one inbox. A sender may have [`ROOM`] frames in each inbox, so that a slow reader holds back
-//! those who write to it and nobody else; inboxes are never full, and no send ever waits. Who found no room is woken when
-//! there is some again: asleep, it would leave its processor idle while there is work to be sent for.
+//! those who write to it and nobody else; inboxes are never full, and no send ever waits. Who found no room is woken
+//! when there is some again: asleep, it would leave its processor idle while there is work to be sent for.
 #![forbid(unsafe_code)]
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, unbounded};
@@ -69,8 +69,9 @@ impl MemoryLink {
         &self.shared.refused[usize::from(from) * self.shared.inboxes.len() + usize::from(to)]
     }
 
-    /// Whether there is room at `to`. Only this end adds to the counter, so what is free now stays free. If there is none, it
-    /// is looked at once more after saying so: the reader frees first and looks then, so one of the two sees the other.
+    /// Whether there is room at `to`. Only this end adds to the counter, so what is free now stays free. If there is
+    /// none, it is looked at once more after saying so: the reader frees first and looks then, so one of the two sees
+    /// the other.
     fn has_room(&self, to: Peer) -> bool {
         let free = || self.flying(self.me, to).load(Ordering::SeqCst) < ROOM;
         if free() {

@@ -246,20 +246,10 @@ fn signs_of_edges_are_exact() {
 
 const CLOSENESS: [f32; 6] = [1.0, 0.3, 0.1, 1e-2, 1e-3, 1e-4];
 
-/// What is lost today, so that it does not grow.
+/// Woop's test shifts an edge by a few roundings of the distance to its ends, which may be a thousand times that to the hit,
+/// and then a ray beside the edge is given to the wall whose vertices it passes by: with boxes as wide as the vertices, up
+/// to 0.2 % of these rays were lost.
 #[test]
-fn axis_aligned_rooms_leak_little() {
-    for closeness in CLOSENESS {
-        let lost = check_room(closeness, 50_000);
-        assert!(lost < 250, "{closeness}: {lost}");
-    }
-}
-
-/// A BUG, and not a matter of this test: Woop's test shifts an edge by a few roundings of the distance to its ends, which
-/// may be a thousand times that to the hit, and then a ray beside the edge is given to the wall whose own box it is not in.
-/// The cure is a box that is wider than the vertices by as much: 4 epsilons of the longest side, and an ulp.
-#[test]
-#[ignore = "the own-box rule loses up to 0.2 % of rays that pass close by an edge between axis-aligned walls"]
 fn axis_aligned_rooms_do_not_leak() {
     let lost: Vec<usize> = CLOSENESS.into_iter().map(|c| check_room(c, 100_000)).collect();
     assert_eq!(lost.iter().sum::<usize>(), 0, "{lost:?}");

@@ -76,7 +76,7 @@ pub fn on_the_grid(seed: u64, count: usize) -> Vec<Object> {
         if i.is_multiple_of(4) {
             Object::Sphere(Sphere { centre: r.grid_point(0.75), radius: 0.125 })
         } else {
-            let mut v = [0; 3].map(|_| r.grid_point(1.0));
+            let mut v = [0; 3].map(|_| r.grid_point(0.875));
             let axis = i % 5;
             if axis < 3 {
                 (v[1][axis], v[2][axis]) = (v[0][axis], v[0][axis]);

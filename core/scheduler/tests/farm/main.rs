@@ -25,8 +25,20 @@ fn each_seed(count: u64, one: impl Fn(u64) -> Result<(), String>) {
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     let seeds = number("HYBRAY_SEED").map_or(0..number("HYBRAY_SEEDS").unwrap_or(count), |seed| seed..seed + 1);
     for seed in seeds {
+        let _named = Named(seed);
         if let Err(what) = one(seed) {
-            panic!("seed {seed}: {what} (HYBRAY_SEED={seed} plays it again)");
+            panic!("{what}");
+        }
+    }
+}
+
+/// Names the seed of a failure, whether the test found it or the world.
+struct Named(u64);
+
+impl Drop for Named {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("HYBRAY_SEED={} plays it again", self.0);
         }
     }
 }

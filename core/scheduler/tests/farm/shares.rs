@@ -12,8 +12,8 @@ use hybray_wire::TileMap;
 const WIDTH: u32 = 480;
 const HEIGHT: u32 = 360;
 
-/// Nanoseconds of each tile on a node of speed 1: a dear patch that stands before a cheap sky, up to 20 times as dear, and
-/// chance by a third. 2,700 tiles of 1.3 ms on average.
+/// Nanoseconds of each tile on a node of speed 1: a dear patch that stands before a cheap sky, up to 20 times as dear,
+/// and chance by a third. 2,700 tiles of 1.3 ms on average.
 fn uneven() -> Vec<u64> {
     let map = TileMap::new(WIDTH, HEIGHT).unwrap();
     let mut rng = Rng(1);
@@ -121,8 +121,8 @@ fn unlike_nodes_end_together() {
     }
 }
 
-/// A node that is much slower than seven others adds little, and must cost little. It can cost no less than one dear run of
-/// its own: nobody can take over what it has.
+/// A node that is much slower than seven others adds little, and must cost little. It can cost no less than one dear
+/// run of its own: nobody can take over what it has.
 #[test]
 fn a_slow_node_does_not_delay_the_end() {
     let costs = uneven();
