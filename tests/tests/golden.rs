@@ -19,18 +19,18 @@ use hybray_tests::{Picture, kernels, scene};
 const GOLDEN: [(&str, u64); 14] = [
     ("spd:balls:3", 0x29eceff5ff69ee8a),
     ("spd:balls-noground:2", 0x349e78c93249cc4b),
-    ("spd:gears:2", 0x416eb62788a715d8),
+    ("spd:gears:2", 0x61eb48c79cc4031d),
     ("spd:lattice:3", 0x1988a1c8fdea759b),
-    ("spd:mount:4", 0x587b318b2e2ef618),
+    ("spd:mount:4", 0x0d295582c0df66aa),
     ("spd:rings:3", 0xb004a8a0d19377f6),
-    ("spd:sombrero:1", 0x8f4bce65bf988c7f),
-    ("spd:teapot:5", 0x58e62dd851ab9e35),
+    ("spd:sombrero:1", 0x81b6b1ae74413030),
+    ("spd:teapot:5", 0x3b8a743afe741a2f),
     ("spd:tetra:5", 0x855d360f2abaffda),
     ("spd:tree:7", 0x7d21176ca49f50db),
-    ("cornell", 0x0dc1b32788ed96af),
-    ("cornell:mirror", 0xfd590b5c55f48ee3),
-    ("organic:3000", 0x92d98d6b3bee65d7),
-    ("terrain:8000", 0xd28850a2ac74b571),
+    ("cornell", 0xf2208b176d039c34),
+    ("cornell:mirror", 0x729b7b64f4b372f0),
+    ("organic:3000", 0xa8734b777f7e6cce),
+    ("terrain:8000", 0x0f44243739ae19fd),
 ];
 
 #[test]

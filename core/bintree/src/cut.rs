@@ -55,6 +55,12 @@ struct Contents {
     cone_materials: [u16; CONES_MAX],
 }
 
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
 /// A subtree: a node, or a range of a leaf's items that is cut further.
 #[derive(Clone, Copy)]
 struct Part {

@@ -43,6 +43,14 @@ pub struct Counts {
     pub pages: u64,
 }
 
+impl core::ops::AddAssign for Counts {
+    fn add_assign(&mut self, b: Self) {
+        self.nodes += b.nodes;
+        self.blocks += b.blocks;
+        self.pages += b.pages;
+    }
+}
+
 const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
 
 /// What a walk keeps while it goes: lent by the caller, since clearing it for each ray would cost as much as a short
@@ -104,9 +112,7 @@ impl<const ANY: bool> Kernel for Walk<'_, '_, ANY> {
             counts: Counts::default(),
         };
         walker.directory::<ANY>(self.scene, self.stack);
-        self.counts.nodes += walker.counts.nodes;
-        self.counts.blocks += walker.counts.blocks;
-        self.counts.pages += walker.counts.pages;
+        *self.counts += walker.counts;
         walker.best
     }
 }

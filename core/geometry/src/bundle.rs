@@ -73,7 +73,8 @@ impl Bundle {
         // A point of a ray is at most 2 sqrt(3) reach from its origin (inside the boxes), its slopes and both dot
         // products are off by a few roundings of terms of that size each, and slopes are at most 10.
         let margins = normals.map(|n| 96.0 * UNIT_ROUNDOFF * (n.abs().element_sum() + 1.0) * reach);
-        let bounded = magnitude.is_finite() && reach.is_finite() && margins.iter().chain(&offsets).all(|m| m.is_finite());
+        let bounded =
+            magnitude.is_finite() && reach.is_finite() && margins.iter().chain(&offsets).all(|m| m.is_finite());
         (bounded && fastest > 0.0).then_some(Self {
             normals,
             offsets,

@@ -112,7 +112,8 @@ impl Cone {
         let (height, across) = f.split(o + Vec3::from_array(ray.direction).as_dvec3() * f64::from(t));
         let height = height.clamp(0.0, 1.0);
         let length = libm::sqrt(across.dot(across));
-        let side = if length > 0.0 { across / length } else { (f.axis / libm::sqrt(f.axis_squared)).any_orthonormal_vector() };
+        let side =
+            if length > 0.0 { across / length } else { (f.axis / libm::sqrt(f.axis_squared)).any_orthonormal_vector() };
         let position = (self.base.as_dvec3() + f.axis * height + side * f.radius_at(height)).as_vec3();
         let normal = side * f.axis_squared - f.axis * f.slope;
         let normal = (normal / libm::sqrt(normal.dot(normal))).as_vec3();

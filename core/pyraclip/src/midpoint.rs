@@ -9,7 +9,12 @@ impl Bintree for Tree<'_> {
     type Cell = u32;
 
     fn root(&self) -> (u32, Aabb) {
-        (0, self.nodes.first().map_or(Aabb { lo: hybray_geometry::Vec3::ZERO, hi: hybray_geometry::Vec3::ZERO }, |n| n.aabb))
+        (
+            0,
+            self.nodes
+                .first()
+                .map_or(Aabb { lo: hybray_geometry::Vec3::ZERO, hi: hybray_geometry::Vec3::ZERO }, |n| n.aabb),
+        )
     }
 
     fn split(&self, cell: u32) -> Option<Split<u32>> {

@@ -15,13 +15,9 @@ fn a_pyramid_of_rays_through_balls() {
         (state >> 40) as f32 / (1u64 << 24) as f32
     };
     let spheres: Vec<Sphere> = (0..500)
-        .map(|_| Sphere {
-            centre: Vec3::new(random(), random(), random()) * 2.0 - 1.0,
-            radius: 0.01 + 0.05 * random(),
-        })
+        .map(|_| Sphere { centre: Vec3::new(random(), random(), random()) * 2.0 - 1.0, radius: 0.01 + 0.05 * random() })
         .collect();
-    let mut items: Vec<Item> =
-        (0..).zip(&spheres).map(|(id, s)| Item::new(&s.aabb(), Kind::Sphere, id)).collect();
+    let mut items: Vec<Item> = (0..).zip(&spheres).map(|(id, s)| Item::new(&s.aabb(), Kind::Sphere, id)).collect();
     items.resize(8000, items[0]);
     let mut leaves = items.clone();
     let mut nodes = vec![BinaryNode::EMPTY; 8000];

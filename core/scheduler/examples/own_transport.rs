@@ -86,9 +86,9 @@ fn work(node: &mut Node<'_, '_>, link: &mut Channels, clock: &mut dyn FnMut() ->
     let mut host_is_here = true;
     while host_is_here && !node.is_stopped() {
         let received = link.receive(&mut |event| match event {
-            Event::Frame { bytes, .. } => {
+            Event::Frame { from, bytes } => {
                 if let Ok(view) = decode(bytes) {
-                    node.handle(&view.message);
+                    node.handle(from, &view.message);
                 }
             }
             Event::Lost { peer } => host_is_here &= peer != HOST,

@@ -192,7 +192,7 @@ impl<'m> Dispatcher<'m> {
         }
         node.runs.pop_front();
         node.tiles_done += u64::from(count);
-        node.nanoseconds += nanoseconds;
+        node.nanoseconds = node.nanoseconds.saturating_add(nanoseconds);
         if !node.measured {
             node.measured = true;
             let round_trip = now.saturating_sub(node.first_sent_at.unwrap_or(now));
@@ -227,8 +227,10 @@ impl<'m> Dispatcher<'m> {
         if let Some(atomic) = self.options.atomic {
             return atomic.max(1);
         }
-        let (tiles, nanoseconds) =
-            self.nodes.iter().fold((0, 0), |(t, n), node| (t + node.tiles_done, n + node.nanoseconds));
+        let (tiles, nanoseconds) = self
+            .nodes
+            .iter()
+            .fold((0, 0), |(t, n), node| (t + node.tiles_done, u64::saturating_add(n, node.nanoseconds)));
         let nodes = self.sharing();
         let most = (self.tiles / (16 * nodes)).max(1);
         if tiles == 0 || self.overhead == u64::MAX {

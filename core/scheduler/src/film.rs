@@ -92,7 +92,7 @@ impl<'m> Film<'m> {
     /// pixel, `tiles` one a tile.
     #[must_use]
     pub fn new(frame: &Frame, sums: &'m mut [[u64; 3]], tiles: &'m mut [TileState]) -> Option<Self> {
-        let map = TileMap::new(frame.width, frame.height)?;
+        let map = TileMap::new(frame.width, frame.height).filter(|_| frame.samples > 0)?;
         if sums.len() != frame.width as usize * frame.height as usize || tiles.len() != map.len() as usize {
             return None;
         }

@@ -18,7 +18,7 @@ pub use dispatcher::{Dispatcher, NodeState, Options};
 pub use film::{Film, FilmError, Fixed, Step, TileState};
 pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
-pub use node::{DEPTH_MAX, Node, NodeMemory};
+pub use node::{DEPTH_MAX, Node, NodeMemory, can_draw};
 
 use hybray_link::{Link, Peer};
 use hybray_wire::{MESSAGE_BYTES_MAX, Message, encode};

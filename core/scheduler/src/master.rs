@@ -124,12 +124,19 @@ impl<'m> Master<'m> {
     #[must_use]
     pub fn outcome(&self) -> Option<Outcome> {
         let outcome = self.outcome.filter(|_| self.stopping == Some(self.nodes.len()))?;
+        // A node that is stopped in its work still says what it did.
+        if outcome == Outcome::Stopped && self.nodes.iter().any(|n| n.greeted && !n.reported && !n.lost) {
+            return None;
+        }
         // What was on its way when the last of them was lost may have been all that was missing.
         Some(if outcome == Outcome::Abandoned && self.film.is_finished() { Outcome::Finished } else { outcome })
     }
 
     /// Ends the picture as it is.
     pub fn stop(&mut self) {
+        if self.outcome.is_none() {
+            self.nodes.iter_mut().for_each(|node| node.reported = false);
+        }
         self.end(Outcome::Stopped);
     }
 
@@ -156,7 +163,7 @@ impl<'m> Master<'m> {
                 }
             }
             Message::Contributions { tile, epoch, width, height, rays, entry } => {
-                self.rays += u64::from(rays);
+                self.rays = self.rays.saturating_add(u64::from(rays));
                 if self.film.add(tile, epoch, (width, height), entry, view.body).is_err() {
                     self.refused_frames += 1;
                 }

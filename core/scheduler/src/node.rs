@@ -99,13 +99,43 @@ struct Picture {
     step: Step,
 }
 
+impl Picture {
+    fn new(frame: Frame) -> Option<Self> {
+        let camera = Camera::look(
+            frame.eye.into(),
+            frame.target.into(),
+            frame.up.into(),
+            frame.fov_y_degrees,
+            frame.hither,
+            frame.width,
+            frame.height,
+        );
+        let sound = frame.samples > 0 && (1..=DEPTH_MAX as u8).contains(&frame.depth_max);
+        Some(Self {
+            frame,
+            map: TileMap::new(frame.width, frame.height).filter(|_| sound)?,
+            camera: camera.ok()?,
+            filter: Filter::from_u32(u32::from(frame.filter))?,
+            step: Step::new(frame.step_log2),
+        })
+    }
+}
+
+/// Whether nodes can draw this picture: it has pixels, samples, a depth of 1 to 64, a filter, and a camera that looks
+/// somewhere. Ask before it begins: a node passes over what it cannot draw, and its tiles would be waited for.
+#[must_use]
+pub fn can_draw(frame: &Frame) -> bool {
+    Picture::new(*frame).is_some()
+}
+
 /// What is in work.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
     /// Nothing: the next bundle may begin.
     Idle,
-    /// Sample `sample` of the bundle; rays from `next` on are still to be shaded.
-    Shading { sample: u16, next: usize },
+    /// Sample `sample` of the bundle; rays from `next` on are still to be shaded, and of the one before, `depth` records of
+    /// the lane are in use.
+    Shading { sample: u16, next: usize, depth: usize },
     /// Tiles from `tile` on are still to be sent.
     Sending { tile: usize },
 }
@@ -165,10 +195,10 @@ impl<'m, 's> Node<'m, 's> {
         }
     }
 
-    /// Whether it was told to end.
+    /// Whether it was told to end, and has said what it did.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.stopped
+        self.stopped && !self.report
     }
 
     /// Boxes, blocks and pages of all walks so far.
@@ -177,11 +207,12 @@ impl<'m, 's> Node<'m, 's> {
         self.walk_counts
     }
 
-    /// Takes in a message; those for other machines are passed over.
-    pub fn handle(&mut self, message: &Message) {
+    /// Takes in a message; those for other machines, and those from peers that have no right to them, are passed over.
+    /// A node draws one picture.
+    pub fn handle(&mut self, from: Peer, message: &Message) {
         match *message {
-            Message::Begin(frame) => self.begin(frame),
-            Message::Tiles { first, count, epoch } => {
+            Message::Begin(frame) if from == HOST && self.picture.is_none() => self.begin(frame),
+            Message::Tiles { first, count, epoch } if from == self.dispatcher => {
                 let fits = self
                     .picture
                     .as_ref()
@@ -191,34 +222,25 @@ impl<'m, 's> Node<'m, 's> {
                     self.runs_given += 1;
                 }
             }
-            Message::Finished { tile: u32::MAX } => self.report = true,
-            Message::Stop => self.stopped = true,
+            Message::Finished { tile: u32::MAX } if from == self.dispatcher => self.report = true,
+            Message::Stop if from == HOST => {
+                // What is in work is lost; what was done is still told.
+                self.runs.clear();
+                self.done.clear();
+                self.stage = Stage::Idle;
+                self.stopped = true;
+                self.report = true;
+            }
             _ => {}
         }
     }
 
     fn begin(&mut self, frame: Frame) {
-        let map = TileMap::new(frame.width, frame.height);
-        let camera = Camera::look(
-            frame.eye.into(),
-            frame.target.into(),
-            frame.up.into(),
-            frame.fov_y_degrees,
-            frame.hither,
-            frame.width,
-            frame.height,
-        );
-        let (Some(map), Ok(camera), Some(filter)) = (map, camera, Filter::from_u32(u32::from(frame.filter))) else {
-            return;
-        };
-        let mut frame = frame;
-        frame.depth_max = frame.depth_max.clamp(1, DEPTH_MAX as u8);
-        frame.samples = frame.samples.max(1);
-        self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
-        self.scene.shading.weight_cutoff = frame.weight_cutoff;
-        self.picture = Some(Picture { frame, map, camera, filter, step: Step::new(frame.step_log2) });
-        self.runs.clear();
-        self.stage = Stage::Idle;
+        self.picture = Picture::new(frame);
+        if let Some(Picture { frame, .. }) = &self.picture {
+            self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
+            self.scene.shading.weight_cutoff = frame.weight_cutoff;
+        }
     }
 
     /// Traces for a while: at most one bundle of primary rays and some thousand rays of their hits. Returns whether
@@ -227,8 +249,8 @@ impl<'m, 's> Node<'m, 's> {
         let before = clock();
         let worked = match self.stage {
             Stage::Idle => self.start_bundle(),
-            Stage::Shading { sample, next } => {
-                self.shade(sample, next);
+            Stage::Shading { sample, next, depth } => {
+                self.shade(sample, next, depth);
                 true
             }
             Stage::Sending { .. } => false,
@@ -306,11 +328,11 @@ impl<'m, 's> Node<'m, 's> {
             &mut self.walk_counts,
         );
         self.counts.primary += rays as u64;
-        self.stage = Stage::Shading { sample, next: 0 };
+        self.stage = Stage::Shading { sample, next: 0, depth: 0 };
     }
 
-    /// Shades hits from `next` on, each to its end, until enough was done.
-    fn shade(&mut self, sample: u16, mut next: usize) {
+    /// Shades hits from `next` on, after what is left of the one before, until enough was done.
+    fn shade(&mut self, sample: u16, mut next: usize, depth: usize) {
         let Some(picture) = &self.picture else { return };
         let (first, tiles, rays) = self.bundle;
         let epoch = self.runs.front().map_or(0, |run| run.epoch);
@@ -319,10 +341,17 @@ impl<'m, 's> Node<'m, 's> {
         let mut sums =
             Sums { step: picture.step, sums: &mut m.sums, entries: &mut m.entries, at: 0, counts: Counts::default() };
         let mut walker = Walker { kernels: self.kernels, stack: &mut m.stack, counts: Default::default() };
-        let mut lane = Lane::new(&mut m.lane);
+        let mut lane = Lane::resume(&mut m.lane, depth);
         let mut counts = Counts::default();
-        let mut steps = 0;
-        while next < rays && steps < STEPS {
+        sums.at = next.checked_sub(1).map_or(0, |ray| usize::from(m.places[ray].sum));
+        for _ in 0..STEPS {
+            if !lane.is_empty() {
+                lane.step(&self.scene, &mut walker, &mut sums, &mut counts);
+                continue;
+            }
+            if next == rays {
+                break;
+            }
             let (place, ray) = (&m.places[next], &m.rays[next]);
             sums.at = usize::from(place.sum);
             let pixel = place.y * width + place.x;
@@ -348,19 +377,14 @@ impl<'m, 's> Node<'m, 's> {
                 footprint: 0.0,
             };
             lane.start(&self.scene, &record, &m.hits[next], &mut sums, &mut counts);
-            while !lane.is_empty() {
-                lane.step(&self.scene, &mut walker, &mut sums, &mut counts);
-                steps += 1;
-            }
             next += 1;
         }
-        self.walk_counts.nodes += walker.counts.nodes;
-        self.walk_counts.blocks += walker.counts.blocks;
-        self.walk_counts.pages += walker.counts.pages;
+        let depth = lane.depth();
+        self.walk_counts += walker.counts;
         counts += sums.counts;
         self.counts += counts;
-        if next < rays {
-            self.stage = Stage::Shading { sample, next };
+        if next < rays || depth > 0 {
+            self.stage = Stage::Shading { sample, next, depth };
         } else if sample + 1 < samples {
             self.start_sample(sample + 1);
         } else {
@@ -491,6 +515,6 @@ impl Sink for Sums<'_> {
     fn ended(&mut self, _: &Origin, entry: u64) {
         let tile = &mut self.entries[self.at / TILE_PIXELS];
         tile.sum = tile.sum.wrapping_add(entry);
-        tile.rays += 1;
+        tile.rays = tile.rays.saturating_add(1);
     }
 }

@@ -88,6 +88,18 @@ impl<'r> Lane<'r> {
         Self { records, depth: 0 }
     }
 
+    /// A lane that goes on with the first `depth` of `records`, as [`Lane::depth`] said when it was put aside.
+    #[must_use]
+    pub fn resume(records: &'r mut [HitRecord], depth: usize) -> Self {
+        Self { depth: depth.min(records.len()), records }
+    }
+
+    /// Records in use.
+    #[must_use]
+    pub fn depth(&self) -> usize {
+        self.depth
+    }
+
     /// Whether nothing is left to do.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -55,13 +55,13 @@ pub struct Counts {
 
 impl core::ops::AddAssign for Counts {
     fn add_assign(&mut self, b: Self) {
-        self.primary += b.primary;
-        self.secondary += b.secondary;
-        self.shadow += b.shadow;
-        self.hits += b.hits;
-        self.contributions += b.contributions;
-        self.refused += b.refused;
-        self.clamped += b.clamped;
+        self.primary = self.primary.saturating_add(b.primary);
+        self.secondary = self.secondary.saturating_add(b.secondary);
+        self.shadow = self.shadow.saturating_add(b.shadow);
+        self.hits = self.hits.saturating_add(b.hits);
+        self.contributions = self.contributions.saturating_add(b.contributions);
+        self.refused = self.refused.saturating_add(b.refused);
+        self.clamped = self.clamped.saturating_add(b.clamped);
     }
 }
 

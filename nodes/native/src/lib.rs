@@ -6,7 +6,7 @@ use hybray_link::{HOST, Peer};
 use hybray_memory::links;
 use hybray_runner::{run_master, run_node};
 use hybray_scheduler::{
-    Dispatcher, Film, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Progress, TileState,
+    Dispatcher, Film, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Progress, TileState, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -60,7 +60,7 @@ pub struct Traced {
 }
 
 /// Traces `frame` on `farm.nodes` threads that all have `scene`. `watch` is called often, on this thread; the picture ends
-/// as it is when it returns false. `None` if the picture has no pixels, or too many.
+/// as it is when it returns false. `None` if nodes cannot draw it ([`can_draw`]).
 ///
 /// # Panics
 /// If a node's thread panics: that is a bug.
@@ -71,7 +71,7 @@ pub fn trace(
     farm: &Farm,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Option<Traced> {
-    let map = TileMap::new(frame.width, frame.height)?;
+    let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
     let nodes = farm.nodes.clamp(1, NODES_MAX);
     let peers = usize::from(nodes) + 1;
     let dispatcher_at = match farm.dispatcher {
@@ -94,16 +94,15 @@ pub fn trace(
         for (peer, mut link) in (1..).zip(ends) {
             let walks = &walks;
             threads.spawn(move || {
-                let mut states = vec![NodeState::default(); peers];
-                let dispatcher = (peer == dispatcher_at).then(|| Dispatcher::new(&mut states, farm.options));
+                let here = peer == dispatcher_at;
+                let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
+                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options));
                 let mut memory = Box::<NodeMemory>::default();
                 let mut node = Node::new(*scene, scene_hash, farm.kernels, dispatcher_at, &mut memory);
                 run_node(&mut node, dispatcher, &mut link, &mut { clock });
                 let counts = node.walk_counts();
                 let mut all = walks.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                all.nodes += counts.nodes;
-                all.blocks += counts.blocks;
-                all.pages += counts.pages;
+                *all += counts;
             });
         }
         let mut states = vec![NodeState::default(); peers];

@@ -54,7 +54,7 @@ pub fn run_node(
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.handle(from, &view.message, now);
                 }
-                node.handle(&view.message);
+                node.handle(from, &view.message);
             }
             Arrival::Lost { peer } => {
                 host_lost |= peer == hybray_link::HOST;

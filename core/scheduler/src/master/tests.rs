@@ -119,6 +119,9 @@ fn the_first_outcome_stays() {
         master.lost(1);
         assert_eq!(master.outcome(), None, "nobody has been told");
         asked(master);
+        report(master, 3);
+        assert_eq!(master.outcome(), None, "node 2 still has to say what it did");
+        report(master, 2);
         assert_eq!(master.outcome(), Some(Outcome::Stopped));
     });
     with_master(|master| {

@@ -90,7 +90,7 @@ impl Worker<'_, '_> {
         let mut busy = false;
         let mut host_lost = false;
         for _ in 0..plan.frames_a_turn {
-            let Self { me, node, dispatcher, runs, held, idle_since, gaps, .. } = self;
+            let Self { me, node, dispatcher, runs, held, in_work, left, idle_since, gaps, .. } = self;
             let more = net.end(*me, now).receive(&mut |event| match event {
                 Event::Frame { from, bytes } => {
                     let Ok(view) = decode(bytes) else { return };
@@ -106,7 +106,12 @@ impl Worker<'_, '_> {
                         *gaps += idle_since.take().map_or(0, |since| now - since);
                         assert!(*held <= 2, "node {me} has {held} runs");
                     }
-                    node.handle(&view.message);
+                    if view.message == Message::Stop {
+                        // It drops what it has, and only says what it did.
+                        runs.clear();
+                        (*in_work, *left) = (0, 0);
+                    }
+                    node.handle(from, &view.message);
                 }
                 Event::Lost { peer } => {
                     host_lost |= peer == HOST;
