@@ -162,7 +162,7 @@ impl Triangle {
 
         SurfacePoint {
             t,
-            test_error: gamma(10) * extent,
+            test_error: gamma(32) * extent,
             t_error: 3.0 * (gamma(3) * edge * z + de * z + dz * edge) * inverse_det.abs(),
             position,
             error: (terms[0].abs() + terms[1].abs() + terms[2].abs()) * gamma(7),

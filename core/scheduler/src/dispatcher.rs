@@ -252,12 +252,6 @@ impl<'m> Dispatcher<'m> {
             && self.nodes.iter().all(|node| node.runs.is_empty())
     }
 
-    /// Whether there is nobody left to give work to.
-    #[must_use]
-    pub fn is_abandoned(&self) -> bool {
-        self.nodes.iter().any(|n| n.lost) && !self.nodes.iter().any(|n| n.here)
-    }
-
     /// What is at work now. Bounded: all nodes, once.
     fn crew(&self) -> Crew {
         let rate = |n: &NodeState| n.tiles_done as f32 / n.nanoseconds as f32;

@@ -45,7 +45,7 @@ impl Walker<'_> {
             let blocked = walk::occluded(self.kernels, &scene.resident, ray, self.stack, &mut self.counts);
             return if blocked { [0.0; 3] } else { contribution };
         }
-        let (mut ray, target) = (*ray, ray.origin + ray.direction);
+        let (mut ray, end) = (*ray, ray.origin + ray.direction * ray.t_max);
         for _ in 0..=SHADOW_CHAIN_MAX {
             let hit = self.nearest(scene, &ray);
             if !hit.candidate.is_hit() {
@@ -61,8 +61,10 @@ impl Walker<'_> {
             match spawn::pass_through(&scene.shading, &place, contribution) {
                 Some((origin, rest)) => {
                     contribution = rest;
-                    // A light at a place is aimed at anew: the way from here is shorter, and ends just before it as before.
-                    ray.direction = if ray.t_max < f32::INFINITY { target - origin } else { ray.direction };
+                    // The end of the ray stays where it is, just before the light, though its start was moved off the surface.
+                    if ray.t_max < f32::INFINITY {
+                        ray.direction = (end - origin) / ray.t_max;
+                    }
                     ray.origin = origin;
                 }
                 None => return [0.0; 3],

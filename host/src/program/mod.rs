@@ -85,8 +85,15 @@ fn completions(shell: clap_complete::Shell) -> Result<End> {
     Ok(End::Done)
 }
 
+/// The program's page, and after it one for each verb, as `man` shows them one below the other.
 fn man() -> Result<End> {
-    clap_mangen::Man::new(Cli::command()).render(&mut std::io::stdout())?;
+    let mut command = Cli::command();
+    command.build();
+    let out = &mut std::io::stdout().lock();
+    clap_mangen::Man::new(command.clone()).render(out)?;
+    for verb in command.get_subcommands().filter(|verb| verb.get_name() != "help") {
+        clap_mangen::Man::new(verb.clone()).render(out)?;
+    }
     Ok(End::Done)
 }
 

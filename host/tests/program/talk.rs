@@ -47,7 +47,7 @@ fn completions_and_manual() {
         assert!(script.contains(word) && script.contains("page-bytes"), "{shell}");
     }
     let manual = text(&folder, "man");
-    for word in [".TH hybray", "render", "trace", "convert"] {
+    for word in [".TH hybray", "render", "trace", "convert", ".TH hybray-render", ".TH hybray-trace"] {
         assert!(manual.contains(word), "{word}");
     }
     let help = text(&folder, "render --help");
