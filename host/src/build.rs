@@ -87,7 +87,7 @@ pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
     })
 }
 
-/// Validated pages, to be borrowed by [`Packed::resident`].
+/// Validated pages, which [`Pages::resident`] lends.
 pub struct Pages<'a> {
     packed: &'a Packed,
     views: Vec<PageView<'a>>,

@@ -11,5 +11,5 @@ mod lane;
 mod scene;
 
 pub use hit::{HitRecord, Origin, surface, surface_point};
-pub use lane::{Lane, Sink, Walker};
+pub use lane::{Lane, SHADOW_CHAIN_MAX, Sink, Walker};
 pub use scene::Scene;
