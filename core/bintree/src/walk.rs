@@ -51,7 +51,8 @@ impl core::ops::AddAssign for Counts {
     }
 }
 
-const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
+/// Subtrees that wait in a walk at most: seven siblings on each level of the directory and of a page.
+pub const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
 
 /// What a walk keeps while it goes: lent by the caller, since clearing it for each ray would cost as much as a short
 /// walk. 4.5 KB.

@@ -46,7 +46,7 @@ pub const fn gamma(n: u32) -> f32 {
     nu / (1.0 - nu)
 }
 
-/// `v` over its length, the same bits on every target.
+/// `v` over its length, the same bits on every target; not finite if `v` is zero or its square overflows.
 #[must_use]
 #[inline]
 pub fn normalize(v: Vec3) -> Vec3 {

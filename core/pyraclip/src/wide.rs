@@ -6,10 +6,10 @@
 //! same hits to the bit, because each only leaves out boxes that a ray does not meet before its best hit, and the tests
 //! are those of `hybray-geometry`.
 
-use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk};
+use hybray_bintree::walk::{Counts, Hit, Resident, STACK, Stack, Walk};
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, DEPTH_MAX, Kind, Node, PageView, Slot, WIDTH};
+use hybray_scene::{BLOCK, Child, Kind, Node, PageView, Slot, WIDTH};
 
 /// Rays of a bundle at most.
 pub const RAYS_MAX: usize = 256;
@@ -19,8 +19,6 @@ const GROUP: usize = 8;
 const LIST_MAX: usize = 128;
 /// A bundle of this many rays or fewer is not divided: its rays go singly.
 const DIVIDE_MIN: usize = 16;
-/// Waiting subtrees at most.
-const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
 
 /// A leaf on a cliplist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,11 +35,11 @@ pub struct Leaf {
     pub hi: [f32; 3],
 }
 
-/// What tracing a bundle needs: lent by the caller. About 12 KB.
+/// What tracing a bundle needs: lent by the caller. About 9 KB.
 #[derive(Clone, Debug)]
 pub struct Scratch {
     list: [Leaf; LIST_MAX],
-    waiting: [(f32, u32, u32); STACK],
+    waiting: [(u32, u32); STACK],
 }
 
 impl Scratch {
@@ -49,7 +47,7 @@ impl Scratch {
     #[must_use]
     pub const fn new() -> Self {
         const NOTHING: Leaf = Leaf { near: 0.0, page: 0, child: 0, lo: [0.0; 3], hi: [0.0; 3] };
-        Self { list: [NOTHING; LIST_MAX], waiting: [(0.0, 0, 0); STACK] }
+        Self { list: [NOTHING; LIST_MAX], waiting: [(0, 0); STACK] }
     }
 
     /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet; `None` if there are more than 128.
@@ -175,11 +173,11 @@ fn clip<S: Simd>(
     }
     let Scratch { list, waiting } = scratch;
     let mut length = 0;
-    waiting[0] = (0.0, Child::Inner(0).pack(), DIRECTORY);
+    waiting[0] = (Child::Inner(0).pack(), DIRECTORY);
     let mut top = 1;
     while top > 0 {
         top -= 1;
-        let (_, packed, page) = waiting[top];
+        let (packed, page) = waiting[top];
         let (node, page): (&Node, u32) = match Child::unpack(packed) {
             Child::Inner(index) if page == DIRECTORY => (&scene.directory.nodes[index as usize], page),
             Child::Inner(index) => (&scene.pages[page as usize].nodes[index as usize], page),
@@ -201,7 +199,7 @@ fn clip<S: Simd>(
                     Leaf { near: near[slot], page, child, lo: corner(&node.lo), hi: corner(&node.hi) };
                 length += 1;
             } else {
-                waiting[top] = (near[slot], child, page);
+                waiting[top] = (child, page);
                 top += 1;
             }
         }

@@ -57,10 +57,10 @@ impl Header {
     #[must_use]
     pub const fn bytes_for(&self) -> u64 {
         HEADER_BYTES as u64
-            + self.nodes as u64 * 224
-            + self.triangle_blocks as u64 * 160
-            + self.sphere_blocks as u64 * 80
-            + self.cones as u64 * 36
+            + self.nodes as u64 * size_of::<Node>() as u64
+            + self.triangle_blocks as u64 * size_of::<TriangleBlock>() as u64
+            + self.sphere_blocks as u64 * size_of::<SphereBlock>() as u64
+            + self.cones as u64 * size_of::<ConeRecord>() as u64
             + self.normals as u64 * 12
             + self.materials as u64 * 2
     }
@@ -172,10 +172,10 @@ impl<'a> PageView<'a> {
         }
 
         let (_, rest) = all.split_at(HEADER_BYTES);
-        let (nodes, rest) = rest.split_at(header.nodes as usize * 224);
-        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * 160);
-        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * 80);
-        let (cones, rest) = rest.split_at(header.cones as usize * 36);
+        let (nodes, rest) = rest.split_at(header.nodes as usize * size_of::<Node>());
+        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * size_of::<TriangleBlock>());
+        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * size_of::<SphereBlock>());
+        let (cones, rest) = rest.split_at(header.cones as usize * size_of::<ConeRecord>());
         let (normals, rest) = rest.split_at(header.normals as usize * 12);
         let (materials, _) = rest.split_at(header.materials as usize * 2);
         let view = Self {
@@ -187,7 +187,7 @@ impl<'a> PageView<'a> {
             normals: bytemuck::cast_slice(normals),
             materials: bytemuck::cast_slice(materials),
         };
-        check_nodes(view.nodes, &mut [0; PAGE_BYTES_MAX / 224], |child| match child {
+        check_nodes(view.nodes, &mut [0; PAGE_BYTES_MAX / size_of::<Node>()], |child| match child {
             Child::Leaf { kind, start, count } => {
                 let have = match kind {
                     Kind::Triangle => view.triangles.len(),

@@ -26,7 +26,8 @@ const RUNS: usize = 4;
 /// Lane steps in one [`Node::step`].
 const STEPS: usize = 4096;
 
-/// Everything that a node works in, carved before it starts: 46 KB, a record for each level of depth included.
+/// Everything that a node works in, carved before it starts: 43 KB, a record for each level of depth included (term by
+/// term in docs/MEMORY.md).
 pub struct NodeMemory {
     rays: [Ray; BUNDLE],
     hits: [Hit; BUNDLE],
@@ -37,6 +38,8 @@ pub struct NodeMemory {
     stack: Stack,
     bundle: wide::Scratch,
 }
+
+const _: () = assert!(size_of::<NodeMemory>() <= 43_360);
 
 /// Depth of a picture at most.
 pub const DEPTH_MAX: usize = 64;

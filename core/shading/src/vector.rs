@@ -2,11 +2,7 @@
 
 use glam::Vec3;
 
-/// `v` at length 1; not finite if `v` is zero or its square overflows.
-#[inline]
-pub(crate) fn normalize(v: Vec3) -> Vec3 {
-    v / libm::sqrtf(v.dot(v))
-}
+pub(crate) use hybray_geometry::normalize;
 
 /// Two unit vectors that make a right-handed orthonormal basis `(a, b, n)` with the unit vector `n`.
 ///

@@ -81,14 +81,15 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         Outcome::Stranger { peer } => bail!("node {peer} has another scene or version"),
         Outcome::Abandoned => bail!("every node was lost before the picture was finished"),
     }
-    prepared.warnings.extend(film_warnings(&traced));
+    let film_warnings: Vec<_> = film_warnings(&traced).collect();
+    prepared.warnings.extend_from_slice(&film_warnings);
     let rays = total_rays(&traced);
     output.write(&picture(&frame, std::mem::take(&mut traced.radiance)), exposure)?;
     let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
     if let Some(json) = json {
         json.write(&report(args, &prepared, &frame, &farm, &traced, seconds))?;
     }
-    film_warnings(&traced).for_each(|warning| show.line(&format!("warning: {warning}")));
+    film_warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
     show.line(&format!(
         "{} x {}, {} sample{}: {rays} rays in {:.2} s, {}; import {:.2} s, build {:.2} s",
         frame.width,
