@@ -1,11 +1,14 @@
 //! A scene ready to be traced: pages, tables, and what it requires.
 
 use crate::build::{self, BuildError, Packed, Pages};
+use crate::framing;
 use crate::model::{CameraSpec, Model, Objects, Settings};
+use crate::pack::{self, HybError, Packing};
 use hybray_scheduler::Step;
 use hybray_shading::{Filter, Light, LightKind, Material, spawn};
 use hybray_tracer::Scene;
 use hybray_wire::Frame;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Samples of a pixel if nobody says.
@@ -35,6 +38,8 @@ pub struct Prepared {
     pub primitives: [u64; 3],
     /// Triangles with vertex normals.
     pub smooth: u64,
+    /// Least and greatest corner of everything, file units.
+    pub extent: [[f32; 3]; 2],
     /// What could not be honoured.
     pub warnings: Vec<String>,
     /// How long the build took.
@@ -48,10 +53,28 @@ impl Prepared {
     ///
     /// # Errors
     /// See [`BuildError`].
-    pub fn new(model: Model, settings: &build::Settings) -> Result<Self, BuildError> {
+    pub fn new(mut model: Model, settings: &build::Settings) -> Result<Self, BuildError> {
         let start = Instant::now();
         let packed = build::build(&model, settings)?;
         let build_time = start.elapsed();
+        let (lo, hi) = framing::bounds(&model).unwrap_or_default();
+        let meshes = std::mem::take(&mut model.meshes);
+        let triangles = meshes.iter().map(|m| m.triangles.len() as u64).sum();
+        let smooth = meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len() as u64).sum();
+        let primitives = [triangles, model.spheres.len() as u64, model.cones.len() as u64];
+        Ok(Self::of(Packing { packed, model, primitives, smooth, extent: [lo, hi] }, build_time))
+    }
+
+    /// Opens a `.hyb` file.
+    ///
+    /// # Errors
+    /// See [`HybError`].
+    pub fn open(path: &Path) -> Result<Self, HybError> {
+        Ok(Self::of(pack::open(path)?, Duration::ZERO))
+    }
+
+    fn of(packing: Packing, build_time: Duration) -> Self {
+        let Packing { packed, model, primitives, smooth, extent } = packing;
         let scale = libm::ldexpf(1.0, packed.scale_log2);
         let scaled = |v: [f32; 3]| v.map(|x| x * scale);
         let lights: Vec<Light> = model
@@ -66,14 +89,12 @@ impl Prepared {
             })
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
-        let triangles = model.meshes.iter().map(|m| m.triangles.len() as u64).sum();
-        let smooth = model.meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len() as u64).sum();
         let mut hash = packed.hash();
         for bytes in [bytemuck::cast_slice(&materials), bytemuck::cast_slice(&lights)] {
             hash = build::hash_bytes(hash, bytes);
         }
         hash = build::hash_bytes(hash, bytemuck::cast_slice(&[model.ambient, model.background]));
-        Ok(Self {
+        Self {
             packed,
             materials,
             lights,
@@ -82,12 +103,13 @@ impl Prepared {
             cameras: model.cameras,
             settings: model.settings,
             objects: model.objects,
-            primitives: [triangles, model.spheres.len() as u64, model.cones.len() as u64],
+            primitives,
             smooth,
+            extent,
             warnings: model.warnings,
             build_time,
             hash,
-        })
+        }
     }
 
     /// What the scene requires of a node beyond primary rays, in words (DESIGN section 2, law 6).

@@ -121,7 +121,8 @@ fn check(name: &str, model: &Model, camera: bool) {
     }
     let mut tally = Tally::default();
     for settings in [(Rule::SurfaceArea, 65_536), (midpoints, 4096)] {
-        let packed = build(model, &Settings { rule: settings.0, page_bytes: settings.1 }).unwrap();
+        let packed =
+            build(model, &Settings { rule: settings.0, page_bytes: settings.1, ..Settings::default() }).unwrap();
         let pages = packed.open().unwrap();
         let scene = pages.resident();
         let leaves = leaves(&scene);

@@ -4,9 +4,10 @@
 use hybray::build::{Rule, Settings, Source, build};
 use hybray::framing::bounds;
 use hybray::model::Model;
+use hybray::partition::Voxels;
 use hybray_bintree::check::{Coverage, check};
 use hybray_bintree::midpoint;
-use hybray_bintree::walk::{Counts, Hit, Resident, Stack, nearest, occluded};
+use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walked, nearest, occluded};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
 use hybray_pyraclip::wide;
@@ -14,10 +15,13 @@ use hybray_tests::{Random, brute_force, camera_rays, close_rays, degenerate, ran
 
 fn trees() -> Vec<Settings> {
     let midpoints = |depth_max, objects_max| Rule::Midpoint(midpoint::Settings { depth_max, objects_max });
-    [Rule::SurfaceArea, midpoints(18, 12), midpoints(9, 3)]
-        .into_iter()
-        .flat_map(|rule| [4096, 16 * 1024, 64 * 1024].map(|page_bytes| Settings { rule, page_bytes }))
-        .collect()
+    let whole = [Rule::SurfaceArea, midpoints(18, 12), midpoints(9, 3)].into_iter().flat_map(|rule| {
+        [4096, 16 * 1024, 64 * 1024].map(|page_bytes| Settings { rule, page_bytes, ..Settings::default() })
+    });
+    let cut = [Rule::SurfaceArea, midpoints(9, 3)].into_iter().flat_map(|rule| {
+        [Voxels::Grid([3, 2, 2]), Voxels::Adaptive(7)].map(|voxels| Settings { rule, page_bytes: 16 * 1024, voxels })
+    });
+    whole.chain(cut).collect()
 }
 
 /// Rays of a bundle: all lengths that differ in what becomes of them, halves and single rays included.
@@ -66,11 +70,11 @@ fn check_bundles(
     bundle: usize,
 ) {
     let (mut scratch, mut stack, mut counts) = (wide::Scratch::new(), Stack::new(), Counts::default());
-    let mut hits = [Hit::none(0.0); wide::RAYS_MAX];
+    let mut walked = [Walked { best: Hit::none(0.0), needs: Some(0) }; wide::RAYS_MAX];
     for (rays, expected) in rays.chunks(bundle).zip(expected.chunks(bundle)) {
-        wide::nearest(kernels, scene, magnitude, rays, &mut hits, &mut scratch, &mut stack, &mut counts);
-        for ((hit, expected), ray) in hits.iter().zip(expected).zip(rays) {
-            assert_eq!(hit.candidate, *expected, "{what} {ray:?}");
+        wide::nearest(kernels, scene, magnitude, rays, &mut walked, &mut scratch, &mut stack, &mut counts);
+        for ((walked, expected), ray) in walked.iter().zip(expected).zip(rays) {
+            assert_eq!((walked.best.candidate, walked.needs), (*expected, None), "{what} {ray:?}");
         }
     }
 }

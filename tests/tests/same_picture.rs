@@ -31,7 +31,7 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
     let midpoints = Rule::Midpoint(midpoint::Settings { depth_max: 18, objects_max: 12 });
     let trees = [(Rule::SurfaceArea, 65_536), (midpoints, 4096), (Rule::SurfaceArea, 4096), (midpoints, 65_536)];
     let prepared = trees.map(|(rule, page_bytes)| {
-        let prepared = Prepared::new(model.clone(), &Settings { rule, page_bytes });
+        let prepared = Prepared::new(model.clone(), &Settings { rule, page_bytes, ..Settings::default() });
         prepared.unwrap_or_else(|e| panic!("{name} {rule:?} {page_bytes}: {e}"))
     });
 

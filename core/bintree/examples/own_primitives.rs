@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let tables = Tables { materials: 2 };
     let views = pages.iter().map(|lines| PageView::parse(lines, tables)).collect::<Result<Vec<_>, _>>()?;
     let directory = Directory::parse(&nodes[..used], &entries, &mut vec![0; used])?;
-    let scene = Resident { directory, pages: &views };
+    let scene = Resident { directory, pages: &views[..] };
 
     // 5. A ray.
     let ray = Ray {

@@ -11,6 +11,10 @@ use hybray_scene::{
 
 /// The caller's primitives, by [`Item::id`].
 pub trait Primitives {
+    /// What pages call the primitive that items call `number`: the same, if this is not said.
+    fn id(&self, number: u32) -> u32 {
+        number
+    }
     /// The triangle `id`; its box is within that of the item.
     fn triangle(&self, id: u32) -> Triangle;
     /// The sphere `id`.
@@ -150,7 +154,7 @@ impl<P: Primitives> Binary for Filling<'_, P> {
                 let room = c.triangles.get_mut(start..start + blocks)?;
                 for (block, lane, id) in lanes {
                     let slot = (start + block) * BLOCK + lane;
-                    room[block].set(lane, &self.source.triangle(id), id);
+                    room[block].set(lane, &self.source.triangle(id), self.source.id(id));
                     c.triangle_materials[slot] = self.source.material(id);
                     let normals = self.source.normals(id);
                     self.smooth |= normals.is_some();
@@ -163,7 +167,7 @@ impl<P: Primitives> Binary for Filling<'_, P> {
                 let start = self.counts.sphere_blocks as usize;
                 let room = c.spheres.get_mut(start..start + blocks)?;
                 for (block, lane, id) in lanes {
-                    room[block].set(lane, &self.source.sphere(id), id);
+                    room[block].set(lane, &self.source.sphere(id), self.source.id(id));
                     c.sphere_materials[(start + block) * BLOCK + lane] = self.source.material(id);
                 }
                 self.counts.sphere_blocks += blocks as u32;
@@ -173,7 +177,7 @@ impl<P: Primitives> Binary for Filling<'_, P> {
                 let start = self.counts.cones as usize;
                 let room = c.cones.get_mut(start..start + items.len())?;
                 for (i, item) in items.iter().enumerate() {
-                    room[i] = ConeRecord::new(&self.source.cone(item.id), item.id);
+                    room[i] = ConeRecord::new(&self.source.cone(item.id), self.source.id(item.id));
                     c.cone_materials[start + i] = self.source.material(item.id);
                 }
                 self.counts.cones += items.len() as u32;

@@ -2,16 +2,26 @@
 
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Candidate, LaneRay, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, Node, PageView, Slot, WIDTH};
+use hybray_scene::{
+    BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Slot, WIDTH,
+};
 
-/// A scene whose pages are all at hand.
-#[derive(Clone, Copy, Debug)]
-pub struct Resident<'a> {
+/// The directory, and the pages at hand: all of them unless `P` says otherwise.
+#[derive(Debug)]
+pub struct Resident<'a, P: Pages + ?Sized = [PageView<'a>]> {
     /// The top of the tree.
     pub directory: Directory<'a>,
-    /// Every page, by number.
-    pub pages: &'a [PageView<'a>],
+    /// Pages by number.
+    pub pages: &'a P,
 }
+
+impl<P: Pages + ?Sized> Clone for Resident<'_, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P: Pages + ?Sized> Copy for Resident<'_, P> {}
 
 /// A nearest hit and where its primitive is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,46 +85,73 @@ impl Default for Stack {
     }
 }
 
-/// The nearest hit of `ray`.
+/// The nearest hit of `ray` in a scene whose pages are all at hand.
 #[must_use]
 pub fn nearest(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut Stack, counts: &mut Counts) -> Hit {
-    kernels.run(Walk::<false> { scene, ray, stack, counts })
+    kernels.run(Walk::<false, _>::new(scene, ray, stack, counts)).best
 }
 
-/// Whether anything is hit.
+/// Whether anything is hit in a scene whose pages are all at hand.
 #[must_use]
 pub fn occluded(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut Stack, counts: &mut Counts) -> bool {
-    kernels.run(Walk::<true> { scene, ray, stack, counts }).candidate.is_hit()
+    kernels.run(Walk::<true, _>::new(scene, ray, stack, counts)).best.candidate.is_hit()
 }
 
-/// A walk as a kernel, for callers that run one themselves.
-pub struct Walk<'w, 'a, const ANY: bool> {
+/// A walk as a kernel: from the root, or on from a page, as far as the pages at hand go.
+///
+/// The order in which a walk meets pages is a function of the ray and the directory alone: a walk that goes on from page P
+/// looks at P and at what comes after it, and never at what came before. So a ray that is handed from node to node, each
+/// of which walks the pages that it has, tests the same pages as one that finds all of them in one place, or fewer.
+pub struct Walk<'w, 'a, const ANY: bool, P: Pages + ?Sized = [PageView<'a>]> {
     /// Where.
-    pub scene: &'w Resident<'a>,
+    pub scene: &'w Resident<'a, P>,
     /// What.
     pub ray: &'w Ray,
+    /// The best hit so far: [`Hit::none`] of the ray's end to begin with.
+    pub best: Hit,
+    /// The page to go on from; [`FROM_ROOT`] to begin with.
+    pub from: u32,
     /// Scratch.
     pub stack: &'w mut Stack,
     /// Added to.
     pub counts: &'w mut Counts,
 }
 
-impl<const ANY: bool> Kernel for Walk<'_, '_, ANY> {
-    type Output = Hit;
+impl<'w, 'a, const ANY: bool, P: Pages + ?Sized> Walk<'w, 'a, ANY, P> {
+    /// A walk from the root.
+    pub fn new(scene: &'w Resident<'a, P>, ray: &'w Ray, stack: &'w mut Stack, counts: &'w mut Counts) -> Self {
+        Self { scene, ray, best: Hit::none(ray.t_max), from: FROM_ROOT, stack, counts }
+    }
+}
+
+/// Where a walk goes on that has not begun; and what a walk needs that has ended.
+pub const FROM_ROOT: u32 = u32::MAX;
+
+/// How far a walk came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walked {
+    /// The best hit so far.
+    pub best: Hit,
+    /// The page that it needs next and that is not at hand.
+    pub needs: Option<u32>,
+}
+
+impl<const ANY: bool, P: Pages + ?Sized> Kernel for Walk<'_, '_, ANY, P> {
+    type Output = Walked;
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Hit {
+    fn run<S: Simd>(self, simd: S) -> Walked {
         let kernel = RayKernel::new(self.ray);
         let mut walker = Walker::<S> {
             simd,
             boxes: BoxRay::new(simd, &kernel),
             lanes: kernel.splat(simd.splat4(0.0)),
             kernel,
-            best: Hit::none(self.ray.t_max),
+            best: self.best,
             counts: Counts::default(),
         };
-        walker.directory::<ANY>(self.scene, self.stack);
+        let needs = walker.directory::<ANY, P>(self.scene, self.from, self.stack);
         *self.counts += walker.counts;
-        walker.best
+        Walked { best: walker.best, needs }
     }
 }
 
@@ -148,15 +185,20 @@ struct Walker<S: Simd> {
 }
 
 impl<S: Simd> Walker<S> {
-    /// Through the directory, from page to page.
+    /// Through the directory, from page to page; the page that is needed and not at hand.
     #[inline(always)]
-    fn directory<const ANY: bool>(&mut self, scene: &Resident<'_>, stack: &mut Stack) {
+    fn directory<const ANY: bool, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Resident<'_, P>,
+        from: u32,
+        stack: &mut Stack,
+    ) -> Option<u32> {
         let waiting = &mut stack.waiting;
         if scene.directory.nodes.is_empty() {
-            return;
+            return None;
         }
         waiting[0] = (self.kernel.t_min, Child::Inner(0).pack());
-        let mut top = 1;
+        let mut top = if from == FROM_ROOT { 1 } else { self.descend(scene, from, waiting) };
         while top > 0 {
             top -= 1;
             let (near, packed) = waiting[top];
@@ -166,15 +208,52 @@ impl<S: Simd> Walker<S> {
             match Child::unpack(packed) {
                 Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
                 Child::Page(page) => {
+                    let Some(view) = scene.pages.page(page) else { return Some(page) };
                     self.counts.pages += 1;
-                    self.page::<ANY>(page, &scene.pages[page as usize], waiting, top);
+                    self.page::<ANY>(page, &view, waiting, top);
                     if ANY && self.best.candidate.is_hit() {
-                        return;
+                        return None;
                     }
                 }
                 Child::Leaf { .. } | Child::Unused => {}
             }
         }
+        None
+    }
+
+    /// The stack as it was when the walk came to `page`, which is on top of it; returns its length. Along the way from the
+    /// root, what a node's walk would have met before the child that leads to the page is left out, and the rest waits.
+    /// Bounded: the directory's depth.
+    #[inline(never)]
+    fn descend<P: Pages + ?Sized>(
+        &mut self,
+        scene: &Resident<'_, P>,
+        page: u32,
+        waiting: &mut [(f32, u32); STACK],
+    ) -> usize {
+        let (nodes, parents) = (scene.directory.nodes, scene.pages.parents());
+        let mut path = [0; DEPTH_MAX];
+        let mut levels = 0;
+        let mut at = nodes.len().saturating_add(page as usize);
+        while let Some(&parent) = parents.get(at).filter(|&&parent| parent != NO_PARENT) {
+            path[levels] = parent;
+            at = parent as usize / WIDTH;
+            levels += 1;
+            if levels == DEPTH_MAX {
+                break;
+            }
+        }
+        let mut top = 0;
+        for &parent in path[..levels].iter().rev() {
+            let node = &nodes[parent as usize / WIDTH];
+            let child = node.child[parent as usize % WIDTH];
+            let end = self.node(node, waiting, top);
+            // If the child is not among those met, the best hit lies before it, and before all that come after it.
+            let Some(at) = (top..end).find(|&at| waiting[at].1 == child) else { return top };
+            top = at;
+        }
+        // The child that the last step found is the page itself.
+        top + usize::from(levels > 0)
     }
 
     /// Through one page, on the part of the stack above `base`.

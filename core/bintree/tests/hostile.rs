@@ -94,7 +94,7 @@ fn mutated_pages_are_refused_or_walked() {
         let whole = hybray_geometry::Aabb { lo: Vec3::MIN, hi: Vec3::MAX };
         directory[0].set(0, &whole, Child::Page(0));
         let entries = [PageEntry { bytes: view.header.bytes, owner: 0, kind: 0 }];
-        let scene = Resident { directory: Directory { nodes: &directory, entries: &entries }, pages: &[view] };
+        let scene = Resident { directory: Directory { nodes: &directory, entries: &entries }, pages: &[view][..] };
         walk(&scene, &rays[round % rays.len()], kernels[round % 2], &mut stack);
         let _ = check(&scene, &mut [Coverage::NONE; 300], &mut [0]);
     }
@@ -118,7 +118,7 @@ fn mutated_directories_are_refused_or_walked() {
         }
         let Ok(directory) = Directory::parse(&nodes, &entries, &mut level) else { continue };
         accepted += 1;
-        let scene = Resident { directory, pages: &views };
+        let scene = Resident { directory, pages: &views[..] };
         walk(&scene, &rays[round % rays.len()], Kernels::detect(), &mut stack);
         let _ = check(&scene, &mut [Coverage::NONE; 1500], &mut vec![0; views.len()]);
     }

@@ -6,10 +6,10 @@
 //! same hits to the bit, because each only leaves out boxes that a ray does not meet before its best hit, and the tests
 //! are those of `hybray-geometry`.
 
-use hybray_bintree::walk::{Counts, Hit, Resident, STACK, Stack, Walk};
+use hybray_bintree::walk::{Counts, Hit, Resident, STACK, Stack, Walk, Walked};
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, Kind, Node, PageView, Slot, WIDTH};
+use hybray_scene::{BLOCK, Child, Kind, Node, PageView, Pages, Slot, WIDTH};
 
 /// Rays of a bundle at most.
 pub const RAYS_MAX: usize = 256;
@@ -50,11 +50,12 @@ impl Scratch {
         Self { list: [NOTHING; LIST_MAX], waiting: [(0, 0); STACK] }
     }
 
-    /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet; `None` if there are more than 128.
-    pub fn clip(
+    /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet; `None` if there are more than 128, or if a
+    /// page that they are in is not at hand.
+    pub fn clip<P: Pages + ?Sized>(
         &mut self,
         kernels: Kernels,
-        scene: &Resident<'_>,
+        scene: &Resident<'_, P>,
         bundle: &Bundle,
         counts: &mut Counts,
     ) -> Option<&[Leaf]> {
@@ -69,42 +70,43 @@ impl Default for Scratch {
     }
 }
 
-/// The nearest hit of each of `rays`, into the first of `hits`: those of single walks, to the bit.
+/// How far each of `rays` comes, into the first of `walked`: its nearest hit, to the bit that of a single walk, unless it
+/// needs a page that is not at hand.
 ///
 /// Rays that stand together in the slice should be neighbours: it is divided into halves where a bundle does not pay.
 /// `magnitude` bounds all coordinates of the scene. Bounded by the single walks of all rays, and as many clips.
 ///
 /// # Panics
 /// If there are more rays than [`RAYS_MAX`], or fewer hits than rays.
-pub fn nearest(
+pub fn nearest<P: Pages + ?Sized>(
     kernels: Kernels,
-    scene: &Resident<'_>,
+    scene: &Resident<'_, P>,
     magnitude: f32,
     rays: &[Ray],
-    hits: &mut [Hit],
+    walked: &mut [Walked],
     scratch: &mut Scratch,
     stack: &mut Stack,
     counts: &mut Counts,
 ) {
-    assert!(rays.len() <= RAYS_MAX && rays.len() <= hits.len());
-    kernels.run(Nearest { scene, magnitude, rays, hits, scratch, stack, counts });
+    assert!(rays.len() <= RAYS_MAX && rays.len() <= walked.len());
+    kernels.run(Nearest { scene, magnitude, rays, walked, scratch, stack, counts });
 }
 
-struct Nearest<'w, 'a> {
-    scene: &'w Resident<'a>,
+struct Nearest<'w, 'a, P: Pages + ?Sized> {
+    scene: &'w Resident<'a, P>,
     magnitude: f32,
     rays: &'w [Ray],
-    hits: &'w mut [Hit],
+    walked: &'w mut [Walked],
     scratch: &'w mut Scratch,
     stack: &'w mut Stack,
     counts: &'w mut Counts,
 }
 
-impl Kernel for Nearest<'_, '_> {
+impl<P: Pages + ?Sized> Kernel for Nearest<'_, '_, P> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { scene, magnitude, rays, hits, scratch, stack, counts } = self;
+        let Self { scene, magnitude, rays, walked, scratch, stack, counts } = self;
         let mut parts = [(0, 0); 8];
         parts[0] = (0, rays.len());
         let mut waiting = 1;
@@ -120,9 +122,9 @@ impl Kernel for Nearest<'_, '_> {
             if let Some(length) = length {
                 let list = &mut scratch.list[..length];
                 list.sort_unstable_by(|a, b| a.near.total_cmp(&b.near));
-                let hits = &mut hits[first..first + count];
-                for (rays, hits) in part.chunks(GROUP).zip(hits.chunks_mut(GROUP)) {
-                    group(simd, scene, rays, hits, list, stack, counts);
+                let walked = &mut walked[first..first + count];
+                for (rays, walked) in part.chunks(GROUP).zip(walked.chunks_mut(GROUP)) {
+                    group(simd, scene, rays, walked, list, stack, counts);
                 }
             } else if count > DIVIDE_MIN {
                 // Halves of whole groups.
@@ -131,22 +133,22 @@ impl Kernel for Nearest<'_, '_> {
                 parts[waiting + 1] = (first, half);
                 waiting += 2;
             } else {
-                for (ray, hit) in part.iter().zip(&mut hits[first..first + count]) {
-                    *hit = Walk::<false> { scene, ray, stack, counts }.run(simd);
+                for (ray, walked) in part.iter().zip(&mut walked[first..first + count]) {
+                    *walked = Walk::<false, P>::new(scene, ray, stack, counts).run(simd);
                 }
             }
         }
     }
 }
 
-struct Clip<'w, 'a> {
-    scene: &'w Resident<'a>,
+struct Clip<'w, 'a, P: Pages + ?Sized> {
+    scene: &'w Resident<'a, P>,
     bundle: &'w Bundle,
     scratch: &'w mut Scratch,
     counts: &'w mut Counts,
 }
 
-impl Kernel for Clip<'_, '_> {
+impl<P: Pages + ?Sized> Kernel for Clip<'_, '_, P> {
     type Output = Option<usize>;
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Option<usize> {
@@ -159,11 +161,11 @@ impl Kernel for Clip<'_, '_> {
 /// The directory counts as a page of this number.
 const DIRECTORY: u32 = u32::MAX;
 
-/// Leaves that the bundle meets, in no order; how many, or `None` if they do not fit the list.
+/// Leaves that the bundle meets, in no order; how many, or `None` if they do not fit the list, or are not all at hand.
 #[inline(always)]
-fn clip<S: Simd>(
+fn clip<S: Simd, P: Pages + ?Sized>(
     simd: S,
-    scene: &Resident<'_>,
+    scene: &Resident<'_, P>,
     bundle: &Bundle,
     scratch: &mut Scratch,
     counts: &mut Counts,
@@ -175,15 +177,18 @@ fn clip<S: Simd>(
     let mut length = 0;
     waiting[0] = (Child::Inner(0).pack(), DIRECTORY);
     let mut top = 1;
+    // A page's nodes are done with before those of another.
+    let mut nodes: &[Node] = &[];
     while top > 0 {
         top -= 1;
         let (packed, page) = waiting[top];
-        let (node, page): (&Node, u32) = match Child::unpack(packed) {
+        let (node, page) = match Child::unpack(packed) {
             Child::Inner(index) if page == DIRECTORY => (&scene.directory.nodes[index as usize], page),
-            Child::Inner(index) => (&scene.pages[page as usize].nodes[index as usize], page),
+            Child::Inner(index) => (&nodes[index as usize], page),
             Child::Page(page) => {
                 counts.pages += 1;
-                (&scene.pages[page as usize].nodes[0], page)
+                nodes = scene.pages.page(page)?.nodes;
+                (&nodes[0], page)
             }
             Child::Leaf { .. } | Child::Unused => continue,
         };
@@ -209,11 +214,11 @@ fn clip<S: Simd>(
 
 /// Up to eight rays along a cliplist.
 #[inline(always)]
-fn group<S: Simd>(
+fn group<S: Simd, P: Pages + ?Sized>(
     simd: S,
-    scene: &Resident<'_>,
+    scene: &Resident<'_, P>,
     rays: &[Ray],
-    hits: &mut [Hit],
+    walked: &mut [Walked],
     list: &[Leaf],
     stack: &mut Stack,
     counts: &mut Counts,
@@ -221,8 +226,8 @@ fn group<S: Simd>(
     // Lanes without a ray repeat the last one.
     let kernels: [RayKernel; GROUP] = core::array::from_fn(|i| RayKernel::new(&rays[i.min(rays.len() - 1)]));
     let Some(lanes) = ray_lanes(simd.splat8(0.0), &kernels) else {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = Walk::<false> { scene, ray, stack, counts }.run(simd);
+        for (ray, walked) in rays.iter().zip(walked) {
+            *walked = Walk::<false, P>::new(scene, ray, stack, counts).run(simd);
         }
         return;
     };
@@ -239,13 +244,16 @@ fn group<S: Simd>(
         if met == 0 {
             continue;
         }
-        let page = &scene.pages[leaf.page as usize];
-        if self::leaf(simd, &lanes, &kernels, page, leaf, met, &mut best, counts) {
+        // The cliplist was made of pages at hand.
+        let Some(page) = scene.pages.page(leaf.page) else { continue };
+        if self::leaf(simd, &lanes, &kernels, &page, leaf, met, &mut best, counts) {
             farthest = simd.load8(&best.map(|hit| hit.candidate.t));
             stop = greatest(&best);
         }
     }
-    hits.copy_from_slice(&best[..hits.len()]);
+    for (walked, &best) in walked.iter_mut().zip(&best) {
+        *walked = Walked { best, needs: None };
+    }
 }
 
 fn greatest(hits: &[Hit; GROUP]) -> f32 {

@@ -1,7 +1,7 @@
 //! The directory: wide nodes over all pages, small enough for every node.
 
 use crate::page::check_nodes;
-use crate::{Child, Node, PAGE_BYTES_MAX};
+use crate::{Child, Node, PAGE_BYTES_MAX, PageView, WIDTH};
 use bytemuck::{Pod, Zeroable};
 
 /// What is known of a page everywhere. Its box stands in the directory's nodes.
@@ -46,6 +46,45 @@ pub enum DirectoryError {
         /// What the directory says.
         bytes: u32,
     },
+}
+
+/// Pages by number: all of a scene's, or those at hand.
+pub trait Pages {
+    /// The page, if it is at hand.
+    fn page(&self, number: u32) -> Option<PageView<'_>>;
+
+    /// [`parents`] of the directory: what a walk needs to go on from a page. May be empty where every page is at hand.
+    fn parents(&self) -> &[u32] {
+        &[]
+    }
+}
+
+impl Pages for [PageView<'_>] {
+    #[inline(always)]
+    fn page(&self, number: u32) -> Option<PageView<'_>> {
+        self.get(number as usize).copied()
+    }
+}
+
+/// What stands for the parent of the root, and of a page that no node leads to.
+pub const NO_PARENT: u32 = u32::MAX;
+
+/// Fills `out`, of one number for each node and then one for each of the pages, with where each hangs: its parent's
+/// index times 8, plus its slot there.
+pub fn parents(nodes: &[Node], out: &mut [u32]) {
+    out.fill(NO_PARENT);
+    for (index, node) in nodes.iter().enumerate() {
+        for (slot, child) in node.children() {
+            let below = match child {
+                Child::Inner(next) => next as usize,
+                Child::Page(page) => nodes.len() + page as usize,
+                Child::Leaf { .. } | Child::Unused => continue,
+            };
+            if let Some(parent) = out.get_mut(below) {
+                *parent = (index * WIDTH + slot) as u32;
+            }
+        }
+    }
 }
 
 impl<'a> Directory<'a> {

@@ -171,22 +171,7 @@ impl<'a> PageView<'a> {
             return Err(PageError::Header("neither no normals nor three for each triangle"));
         }
 
-        let (_, rest) = all.split_at(HEADER_BYTES);
-        let (nodes, rest) = rest.split_at(header.nodes as usize * size_of::<Node>());
-        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * size_of::<TriangleBlock>());
-        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * size_of::<SphereBlock>());
-        let (cones, rest) = rest.split_at(header.cones as usize * size_of::<ConeRecord>());
-        let (normals, rest) = rest.split_at(header.normals as usize * 12);
-        let (materials, _) = rest.split_at(header.materials as usize * 2);
-        let view = Self {
-            header,
-            nodes: bytemuck::cast_slice(nodes),
-            triangles: bytemuck::cast_slice(triangles),
-            spheres: bytemuck::cast_slice(spheres),
-            cones: bytemuck::cast_slice(cones),
-            normals: bytemuck::cast_slice(normals),
-            materials: bytemuck::cast_slice(materials),
-        };
+        let view = Self::of_valid(lines);
         check_nodes(view.nodes, &mut [0; PAGE_BYTES_MAX / size_of::<Node>()], |child| match child {
             Child::Leaf { kind, start, count } => {
                 let have = match kind {
@@ -204,6 +189,33 @@ impl<'a> PageView<'a> {
             return Err(PageError::Material(material));
         }
         Ok(view)
+    }
+
+    /// A page whose lines [`PageView::parse`] has accepted since they were last written.
+    ///
+    /// # Panics
+    /// If it has not, and the counts do not fit: nothing worse can come of it.
+    #[must_use]
+    #[inline(always)]
+    pub fn of_valid(lines: &'a [Line]) -> Self {
+        let all: &[u8] = bytemuck::cast_slice(lines);
+        let header: &Header = bytemuck::from_bytes(&all[..HEADER_BYTES]);
+        let (_, rest) = all.split_at(HEADER_BYTES);
+        let (nodes, rest) = rest.split_at(header.nodes as usize * size_of::<Node>());
+        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * size_of::<TriangleBlock>());
+        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * size_of::<SphereBlock>());
+        let (cones, rest) = rest.split_at(header.cones as usize * size_of::<ConeRecord>());
+        let (normals, rest) = rest.split_at(header.normals as usize * 12);
+        let (materials, _) = rest.split_at(header.materials as usize * 2);
+        Self {
+            header,
+            nodes: bytemuck::cast_slice(nodes),
+            triangles: bytemuck::cast_slice(triangles),
+            spheres: bytemuck::cast_slice(spheres),
+            cones: bytemuck::cast_slice(cones),
+            normals: bytemuck::cast_slice(normals),
+            materials: bytemuck::cast_slice(materials),
+        }
     }
 
     /// The material of the primitive in `slot`.

@@ -7,10 +7,12 @@
 
 mod toy;
 
+use hybray_arena::{Arena, LINE_BYTES};
 use hybray_geometry::simd::Kernels;
 use hybray_link::{Event, HOST, Link, Peer};
 use hybray_scheduler::{
-    Dispatcher, Film, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, TileState,
+    All, Dispatcher, Film, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Settings, Store,
+    TileState,
 };
 use hybray_wire::{TileMap, decode};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -82,19 +84,22 @@ impl Drop for Channels {
 }
 
 /// Turns a node until it is told to stop, or the host is gone: receive, step, send, wait.
-fn work(node: &mut Node<'_, '_>, link: &mut Channels, clock: &mut dyn FnMut() -> u64) {
+fn work<P: Store>(node: &mut Node<'_, '_, P>, link: &mut Channels, clock: &mut dyn FnMut() -> u64) {
     let mut host_is_here = true;
     while host_is_here && !node.is_stopped() {
         let received = link.receive(&mut |event| match event {
             Event::Frame { from, bytes } => {
                 if let Ok(view) = decode(bytes) {
-                    node.handle(from, &view.message);
+                    node.handle(from, &view);
                 }
             }
-            Event::Lost { peer } => host_is_here &= peer != HOST,
+            Event::Lost { peer } => {
+                host_is_here &= peer != HOST;
+                node.lost(peer);
+            }
         });
         let stepped = node.step(clock);
-        let sent = node.poll(link);
+        let sent = node.poll(link, clock());
         if !(received || stepped || sent) {
             link.wait(20_000_000);
         }
@@ -149,6 +154,10 @@ fn main() {
     let mut master = Master::new(frame, film, &mut reports, SCENE_HASH, HOST);
     let mut dispatcher = Dispatcher::new(&mut states, Options::default());
 
+    // Each node has every page, so what it works in is small. It is carved from bytes that are lent to it.
+    let limits = Limits::all_at_hand();
+    let bytes = NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1;
+
     let start = Instant::now();
     let clock = || start.elapsed().as_nanos() as u64;
     let mut ends = Channels::all(NODES + 1);
@@ -156,8 +165,11 @@ fn main() {
     let outcome = std::thread::scope(|threads| {
         for mut link in nodes {
             threads.spawn(move || {
-                let mut memory = Box::<NodeMemory>::default();
-                let mut node = Node::new(scene, SCENE_HASH, Kernels::Portable, HOST, &mut memory);
+                let mut lent = Box::new_uninit_slice(bytes);
+                let memory = NodeMemory::carve(&mut Arena::new(&mut lent), &limits).expect("the sum of its terms");
+                let (store, settings) = (All(scene.resident.pages), Settings::default());
+                let mut node =
+                    Node::new(scene, store, SCENE_HASH, Kernels::Portable, link.me(), HOST, settings, memory);
                 work(&mut node, &mut link, &mut { clock });
             });
         }

@@ -54,6 +54,8 @@ pub struct NodeState {
     told: bool,
     /// Runs in its hands, the oldest first.
     runs: Runs,
+    /// It has nothing to do, and somebody was told to share with it.
+    helping: bool,
     tiles_done: u64,
     nanoseconds: u64,
     /// When its first run was sent, to learn what a message costs.
@@ -108,6 +110,8 @@ pub struct Dispatcher<'m> {
     /// Least time that a run's messages were seen to take.
     overhead: u64,
     asked: bool,
+    /// Who was last told to share.
+    shared: usize,
 }
 
 impl<'m> Dispatcher<'m> {
@@ -127,6 +131,7 @@ impl<'m> Dispatcher<'m> {
             runs_done: 0,
             overhead: u64::MAX,
             asked: false,
+            shared: 0,
         }
     }
 
@@ -144,6 +149,11 @@ impl<'m> Dispatcher<'m> {
             }
             Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
             Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
+            Message::Idle => {
+                if let Some(node) = self.nodes.get_mut(usize::from(from)) {
+                    node.helping = false;
+                }
+            }
             _ => {}
         }
     }
@@ -350,6 +360,23 @@ impl<'m> Dispatcher<'m> {
         Some(part)
     }
 
+    /// At the end of a picture, those who have nothing to do are given rays by those who have. Bounded: all nodes, once.
+    fn share(&mut self, link: &mut dyn Link) {
+        let count = self.nodes.len();
+        for idle in 1..count {
+            let node = &self.nodes[idle];
+            if !node.here || node.helping || !node.runs.is_empty() {
+                continue;
+            }
+            let busy = |peer: &usize| self.nodes[*peer].here && !self.nodes[*peer].runs.is_empty();
+            let Some(peer) = (self.shared + 1..count).chain(1..(self.shared + 1).min(count)).find(busy) else { return };
+            if send(link, peer as Peer, &Message::Share { with: idle as Peer }) {
+                self.nodes[idle].helping = true;
+                self.shared = peer;
+            }
+        }
+    }
+
     /// Puts a run back where it came from: there is room for it there, or the rest of it.
     fn give_back(&mut self, run: Run) {
         let end = run.first + run.count;
@@ -393,6 +420,9 @@ impl<'m> Dispatcher<'m> {
                     self.give_back(run);
                 }
             }
+        }
+        if self.next == self.tiles && self.again.is_empty() && !self.gathering {
+            self.share(link);
         }
         if self.is_idle() && self.asked {
             for peer in 0..self.nodes.len() {

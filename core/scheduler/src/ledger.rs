@@ -10,6 +10,9 @@
 pub struct Balance(u64);
 
 impl Balance {
+    /// Nothing is owed.
+    pub const ZERO: Self = Self(0);
+
     /// A tile whose primaries have these ids.
     #[must_use]
     pub fn debit(primaries: impl Iterator<Item = u64>) -> Self {

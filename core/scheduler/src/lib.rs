@@ -12,20 +12,27 @@ mod film;
 mod ledger;
 mod master;
 mod node;
+mod plan;
+pub mod policy;
 
 pub use chunk::{Shares, chunk};
 pub use dispatcher::{Dispatcher, NodeState, Options};
 pub use film::{Film, FilmError, Fixed, Step, TileState};
 pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
-pub use node::{DEPTH_MAX, Node, NodeMemory, can_draw};
+pub use node::{
+    All, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own, REQUESTS_MAX,
+    Settings, Store, Traffic, can_draw,
+};
+
+pub use plan::{Plan, PlanError, Sizes};
 
 use hybray_link::{Link, Peer};
-use hybray_wire::{MESSAGE_BYTES_MAX, Message, encode};
+use hybray_wire::{HEAD_BYTES_MAX, Message, encode};
 
 /// Sends a message without a body; false if there is no room now.
 pub(crate) fn send(link: &mut dyn Link, to: Peer, message: &Message) -> bool {
-    link.send(to, MESSAGE_BYTES_MAX, &mut |room| {
+    link.send(to, HEAD_BYTES_MAX, &mut |room| {
         encode(message, room, |_| {}).expect("the room for a message is enough for any")
     })
 }

@@ -124,8 +124,9 @@ impl<'m> Master<'m> {
     #[must_use]
     pub fn outcome(&self) -> Option<Outcome> {
         let outcome = self.outcome.filter(|_| self.stopping == Some(self.nodes.len()))?;
-        // A node that is stopped in its work still says what it did.
-        if outcome == Outcome::Stopped && self.nodes.iter().any(|n| n.greeted && !n.reported && !n.lost) {
+        // A node that is stopped still says what it did: in its work, or for others after its first report.
+        let tell = matches!(outcome, Outcome::Stopped | Outcome::Finished);
+        if tell && self.nodes.iter().any(|n| n.greeted && !n.reported && !n.lost) {
             return None;
         }
         // What was on its way when the last of them was lost may have been all that was missing.
@@ -134,14 +135,12 @@ impl<'m> Master<'m> {
 
     /// Ends the picture as it is.
     pub fn stop(&mut self) {
-        if self.outcome.is_none() {
-            self.nodes.iter_mut().for_each(|node| node.reported = false);
-        }
         self.end(Outcome::Stopped);
     }
 
     fn end(&mut self, outcome: Outcome) {
         if self.outcome.is_none() {
+            self.nodes.iter_mut().for_each(|node| node.reported = false);
             self.outcome = Some(outcome);
             self.stopping = Some(1);
         }

@@ -10,14 +10,22 @@ use hybray_wire::RayRecord;
 /// Whom a ray and its children are traced for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Origin {
-    /// `y * width + x`.
-    pub pixel: u32,
     /// Number of the tile.
     pub tile: u32,
     /// The tile's epoch.
     pub epoch: u16,
-    /// Sample of the pixel.
-    pub sample: u16,
+    /// The node that keeps the tile's sums.
+    pub home: u16,
+    /// Number of the pixel in its tile, row by row.
+    pub pixel: u8,
+}
+
+impl Origin {
+    /// Whom `ray` is traced for.
+    #[must_use]
+    pub fn of(ray: &RayRecord) -> Self {
+        Self { tile: ray.tile, epoch: ray.epoch, home: ray.home, pixel: ray.pixel }
+    }
 }
 
 /// A hit that is spawning its children.
@@ -61,7 +69,7 @@ impl HitRecord {
         children: 0,
         cursor: 0,
         end: 0,
-        origin: Origin { pixel: 0, tile: 0, epoch: 0, sample: 0 },
+        origin: Origin { tile: 0, epoch: 0, home: 0, pixel: 0 },
         depth: 0,
     };
 }
@@ -79,12 +87,20 @@ pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint 
     }
 }
 
-/// What shading sees of `hit`.
+/// What shading sees of `hit`; `None` if `page` has nothing in that place.
 ///
 /// The error given to shading is that of the position, and on every axis that of the test which a ray starting there will
 /// be put to.
 #[must_use]
-pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
+pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surface> {
+    let held = match hit.slot.kind() {
+        Kind::Triangle => page.triangles.len() * BLOCK,
+        Kind::Sphere => page.spheres.len() * BLOCK,
+        Kind::Cone => page.cones.len(),
+    };
+    if hit.slot.number() >= held {
+        return None;
+    }
     let point = surface_point(page, &ray.ray(), hit);
     let flat = Surface {
         position: point.position,
@@ -96,7 +112,7 @@ pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
         material: page.material(hit.slot),
         medium: ray.medium,
     };
-    match vertex_normals(page, hit.slot) {
+    Some(match vertex_normals(page, hit.slot) {
         Some(packed) => {
             let number = hit.slot.number();
             let corners = page.triangles[number / BLOCK].get(number % BLOCK).v;
@@ -104,7 +120,7 @@ pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Surface {
             flat.smooth(corners, packed.map(unpack_normal), [1.0 - u - v, u, v])
         }
         None => flat,
-    }
+    })
 }
 
 fn vertex_normals(page: &PageView<'_>, slot: Slot) -> Option<[u32; 3]> {

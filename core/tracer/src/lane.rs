@@ -1,11 +1,12 @@
-//! A lane: rays finished on the spot, depth first, in bounded memory.
+//! A lane: rays finished on the spot, depth first, in bounded memory, as far as the pages at hand go.
 
 use crate::hit::{HitRecord, Origin, surface};
 use crate::scene::Scene;
 use bytemuck::Zeroable;
-use hybray_bintree::walk::{self, Hit, Stack};
+use hybray_bintree::walk::{self, FROM_ROOT, Hit, Stack, Walk, Walked};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
+use hybray_scene::{Pages, Slot};
 use hybray_shading::{Child, id, spawn};
 use hybray_wire::{Counts, RayKind, RayRecord};
 
@@ -28,49 +29,76 @@ pub struct Walker<'s> {
 }
 
 impl Walker<'_> {
-    /// The nearest hit.
-    #[must_use]
-    pub fn nearest(&mut self, scene: &Scene<'_>, ray: &Ray) -> Hit {
-        walk::nearest(self.kernels, &scene.resident, ray, self.stack, &mut self.counts)
+    fn walk<const ANY: bool, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Scene<'_, P>,
+        ray: &Ray,
+        best: Hit,
+        from: u32,
+    ) -> Walked {
+        let resident = &scene.resident;
+        let stack = &mut *self.stack;
+        self.kernels.run(Walk::<ANY, P> { scene: resident, ray, best, from, stack, counts: &mut self.counts })
     }
 
-    /// What of a shadow ray's `contribution` arrives: all, nothing, or what transparent things in between let through.
+    /// Takes a nearest-hit ray on from where it is. Its nearest hit, or none to its end, once that is known and the page
+    /// that holds it is at hand; before that `None`, and the record names the page that it needs.
+    #[must_use]
+    pub fn nearest<P: Pages + ?Sized>(&mut self, scene: &Scene<'_, P>, ray: &mut RayRecord) -> Option<Hit> {
+        let mut best = Hit { candidate: ray.candidate(), page: ray.hit_page, slot: Slot(ray.slot) };
+        if ray.settled == 0 {
+            let walked = self.walk::<false, P>(scene, &ray.ray(), best, ray.page);
+            best = walked.best;
+            (ray.t_max, ray.primitive) = (best.candidate.t, best.candidate.id);
+            (ray.hit_page, ray.slot) = (best.page, best.slot.0);
+            if let Some(page) = walked.needs {
+                ray.page = page;
+                return None;
+            }
+            ray.settled = 1;
+            ray.page = best.page;
+        }
+        let at_hand = !best.candidate.is_hit() || scene.resident.pages.page(best.page).is_some();
+        at_hand.then_some(best)
+    }
+
+    /// Takes a shadow ray on from where it is: what of its weight arrives at the light, once that is known. Before that
+    /// `None`, and the record names the page that it needs.
     ///
     /// Behind transparent things it is a chain of nearest hits in order along the ray, each with its material's
     /// transmission, so that the product does not depend on the order of pages. A ray that meets more than
     /// [`SHADOW_CHAIN_MAX`] of them is taken to be blocked.
     #[must_use]
-    pub fn arriving(&mut self, scene: &Scene<'_>, ray: &Ray, mut contribution: [f32; 3]) -> [f32; 3] {
+    pub fn arriving<P: Pages + ?Sized>(&mut self, scene: &Scene<'_, P>, ray: &mut RayRecord) -> Option<[f32; 3]> {
         if !scene.transmits {
-            let blocked = walk::occluded(self.kernels, &scene.resident, ray, self.stack, &mut self.counts);
-            return if blocked { [0.0; 3] } else { contribution };
+            let walked = self.walk::<true, P>(scene, &ray.ray(), Hit::none(ray.t_max), ray.page);
+            ray.page = walked.needs.unwrap_or(ray.page);
+            let blocked = walked.best.candidate.is_hit();
+            return walked.needs.is_none().then_some(if blocked { [0.0; 3] } else { ray.weight });
         }
-        let (mut ray, end) = (*ray, ray.origin + ray.direction * ray.t_max);
-        for _ in 0..=SHADOW_CHAIN_MAX {
-            let hit = self.nearest(scene, &ray);
+        loop {
+            let hit = self.nearest(scene, ray)?;
             if !hit.candidate.is_hit() {
-                return contribution;
+                return Some(ray.weight);
             }
-            let record = RayRecord {
-                origin: ray.origin.to_array(),
-                direction: ray.direction.to_array(),
-                t_min: ray.t_min,
-                ..RayRecord::zeroed()
+            let Some(place) = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, &hit)) else {
+                return Some([0.0; 3]);
             };
-            let place = surface(&scene.resident.pages[hit.page as usize], &record, &hit);
-            match spawn::pass_through(&scene.shading, &place, contribution) {
-                Some((origin, rest)) => {
-                    contribution = rest;
-                    // The end of the ray stays where it is, just before the light, though its start was moved off the surface.
-                    if ray.t_max < f32::INFINITY {
-                        ray.direction = (end - origin) / ray.t_max;
-                    }
-                    ray.origin = origin;
-                }
-                None => return [0.0; 3],
+            let Some((origin, rest)) =
+                spawn::pass_through(&scene.shading, &place, ray.weight).filter(|_| u32::from(ray.passed) < SHADOW_CHAIN_MAX)
+            else {
+                return Some([0.0; 3]);
+            };
+            // The end of the ray stays where it is, just before the light, though its start is moved off the surface.
+            if ray.t_end < f32::INFINITY {
+                let end = Vec3::from_array(ray.origin) + Vec3::from_array(ray.direction) * ray.t_end;
+                ray.direction = ((end - origin) / ray.t_end).to_array();
             }
+            ray.origin = origin.to_array();
+            ray.weight = rest;
+            ray.passed += 1;
+            (ray.t_max, ray.primitive, ray.page, ray.settled) = (ray.t_end, Candidate::NOTHING, FROM_ROOT, 0);
         }
-        [0.0; 3]
     }
 }
 
@@ -108,20 +136,30 @@ impl<'r> Lane<'r> {
         self.depth == 0
     }
 
-    /// Takes in a ray whose nearest hit is known: it becomes a record, or it ends here.
+    /// Takes in a ray whose nearest hit is known, and whose hit's page is at hand: it becomes a record, or it ends here.
+    /// A hit that its page does not have (from a peer that lies) is no hit, and no entry: its tile will not balance.
     ///
     /// # Panics
     /// If the ray is deeper than the lane.
-    pub fn start<S: Sink>(&mut self, scene: &Scene<'_>, ray: &RayRecord, hit: &Hit, sink: &mut S, counts: &mut Counts) {
-        let origin = Origin { pixel: ray.pixel, tile: ray.tile, epoch: ray.epoch, sample: ray.sample };
+    pub fn start<S: Sink, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Scene<'_, P>,
+        ray: &RayRecord,
+        hit: &Hit,
+        sink: &mut S,
+        counts: &mut Counts,
+    ) {
+        let origin = Origin::of(ray);
         if !hit.candidate.is_hit() {
             let seen: [f32; 3] = core::array::from_fn(|c| ray.weight[c] * scene.background[c]);
             add(sink, &origin, seen);
             sink.ended(&origin, ray.id.wrapping_neg());
             return;
         }
+        let Some(surface) = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, hit)) else {
+            return;
+        };
         counts.hits += 1;
-        let surface = surface(&scene.resident.pages[hit.page as usize], ray, hit);
         add(sink, &origin, spawn::local(&scene.shading, &surface, ray.weight));
         self.records[self.depth] = HitRecord {
             surface,
@@ -136,63 +174,92 @@ impl<'r> Lane<'r> {
         self.depth += 1;
     }
 
-    /// Traces the next child of the deepest record, or ends it. Bounded: one walk, or one chain of a shadow ray.
-    pub fn step<S: Sink>(&mut self, scene: &Scene<'_>, walker: &mut Walker<'_>, sink: &mut S, counts: &mut Counts) {
-        let Some(top) = self.depth.checked_sub(1) else { return };
+    /// Takes a ray on from where it is: it ends here, or becomes a record, or comes back with the page that it needs.
+    ///
+    /// # Panics
+    /// If the ray is deeper than the lane.
+    pub fn take<S: Sink, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Scene<'_, P>,
+        walker: &mut Walker<'_>,
+        mut ray: RayRecord,
+        sink: &mut S,
+        counts: &mut Counts,
+    ) -> Option<RayRecord> {
+        if ray.kind == RayKind::Shadow as u8 {
+            let origin = Origin::of(&ray);
+            let Some(arrived) = walker.arriving(scene, &mut ray) else { return Some(ray) };
+            add(sink, &origin, arrived);
+            sink.ended(&origin, ray.id.wrapping_neg());
+            return None;
+        }
+        let Some(hit) = walker.nearest(scene, &mut ray) else { return Some(ray) };
+        self.start(scene, &ray, &hit, sink, counts);
+        None
+    }
+
+    /// Traces the next child of the deepest record, or ends it. A child that needs a page that is not at hand comes back.
+    /// Bounded: one walk, or one chain of a shadow ray.
+    pub fn step<S: Sink, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Scene<'_, P>,
+        walker: &mut Walker<'_>,
+        sink: &mut S,
+        counts: &mut Counts,
+    ) -> Option<RayRecord> {
+        let top = self.depth.checked_sub(1)?;
         let record = &mut self.records[top];
         if record.cursor == record.end {
             sink.ended(&record.origin, record.children.wrapping_sub(record.id));
             self.depth = top;
-            return;
+            return None;
         }
         let cursor = record.cursor;
         record.cursor += 1;
         let depth = u32::from(record.depth);
         let child = spawn::child(&scene.shading, &record.surface, record.weight, depth, record.id, cursor);
-        let origin = record.origin;
-        let mut name = |branch: u32| {
-            let id = id::child_id(record.id, branch);
-            record.children = record.children.wrapping_add(id);
-            id
-        };
-        let (kind, start, direction, weight, medium, id) = match child {
-            Child::None => return,
-            Child::Shadow { origin: start, direction, t_max, contribution, branch } => {
-                let id = name(branch);
-                counts.shadow += 1;
-                let ray = Ray { origin: start, direction, t_min: 0.0, t_max };
-                add(sink, &origin, walker.arriving(scene, &ray, contribution));
-                sink.ended(&origin, id.wrapping_neg());
-                return;
+        let (kind, start, direction, t_max, weight, medium, branch) = match child {
+            Child::None => return None,
+            Child::Shadow { origin, direction, t_max, contribution, branch } => {
+                (RayKind::Shadow, origin, direction, t_max, contribution, 0, branch)
             }
             Child::Mirror { origin, direction, weight, medium, branch } => {
-                (RayKind::Mirror, origin, direction, weight, medium, name(branch))
+                (RayKind::Mirror, origin, direction, f32::INFINITY, weight, medium, branch)
             }
             Child::Refract { origin, direction, weight, medium, branch } => {
-                (RayKind::Refract, origin, direction, weight, medium, name(branch))
+                (RayKind::Refract, origin, direction, f32::INFINITY, weight, medium, branch)
             }
         };
-        counts.secondary += 1;
+        let id = id::child_id(record.id, branch);
+        record.children = record.children.wrapping_add(id);
+        let origin = record.origin;
+        let depth = match kind {
+            RayKind::Shadow => record.depth,
+            _ => record.depth + 1,
+        };
         let ray = RayRecord {
             origin: start.to_array(),
             direction: direction.to_array(),
-            t_min: 0.0,
-            t_max: f32::INFINITY,
+            t_max,
+            t_end: t_max,
             id,
             primitive: Candidate::NOTHING,
             weight,
             pixel: origin.pixel,
             tile: origin.tile,
             epoch: origin.epoch,
-            sample: origin.sample,
+            home: origin.home,
+            page: FROM_ROOT,
             medium,
             kind: kind as u8,
-            depth: record.depth + 1,
+            depth,
             ..RayRecord::zeroed()
         };
-        let hit =
-            walker.nearest(scene, &Ray { origin: start, direction: Vec3::from_array(ray.direction), ..ray.ray() });
-        self.start(scene, &ray, &hit, sink, counts);
+        match kind {
+            RayKind::Shadow => counts.shadow += 1,
+            _ => counts.secondary += 1,
+        }
+        self.take(scene, walker, ray, sink, counts)
     }
 }
 

@@ -1,13 +1,14 @@
 //! What a node knows of the scene.
 
 use hybray_bintree::walk::Resident;
+use hybray_scene::{PageView, Pages};
 use hybray_shading as shading;
 
 /// Pages, tables, and what the scene requires.
-#[derive(Clone, Copy, Debug)]
-pub struct Scene<'a> {
-    /// Directory and pages.
-    pub resident: Resident<'a>,
+#[derive(Debug)]
+pub struct Scene<'a, P: Pages + ?Sized = [PageView<'a>]> {
+    /// Directory, and the pages at hand: all of them unless `P` says otherwise.
+    pub resident: Resident<'a, P>,
     /// Materials, lights and limits.
     pub shading: shading::Scene<'a>,
     /// Radiance where a ray meets nothing.
@@ -16,4 +17,29 @@ pub struct Scene<'a> {
     pub magnitude: f32,
     /// Whether some material lets light through: if not, any hit ends a shadow ray, and that is cheaper to find.
     pub transmits: bool,
+}
+
+impl<P: Pages + ?Sized> Clone for Scene<'_, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P: Pages + ?Sized> Copy for Scene<'_, P> {}
+
+impl<'a, P: Pages + ?Sized> Scene<'a, P> {
+    /// The same scene as somebody sees it who has these pages.
+    #[must_use]
+    pub fn at_hand<'b, Q: Pages + ?Sized>(&self, pages: &'b Q) -> Scene<'b, Q>
+    where
+        'a: 'b,
+    {
+        Scene {
+            resident: Resident { directory: self.resident.directory, pages },
+            shading: self.shading,
+            background: self.background,
+            magnitude: self.magnitude,
+            transmits: self.transmits,
+        }
+    }
 }

@@ -2,13 +2,13 @@
 
 mod world;
 
-use hybray_bintree::walk::Stack;
+use hybray_bintree::walk::{self, Stack};
 use hybray_geometry::simd::Kernels;
-use hybray_geometry::{Candidate, Cone, Ray, Sphere, Triangle, Vec3};
+use hybray_geometry::{Candidate, Ray, Sphere, Triangle, Vec3};
 use hybray_shading::{Light, Material, id, spawn};
 use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker, surface};
 use hybray_wire::{Counts, RayKind, RayRecord, ShadowRecord};
-use world::{Shape, World};
+use world::{Shape, World, hall};
 
 /// What a film would get.
 #[derive(Default)]
@@ -38,7 +38,7 @@ impl Record {
     }
 }
 
-const ORIGIN: Origin = Origin { pixel: 77, tile: 5, epoch: 2, sample: 1 };
+const ORIGIN: Origin = Origin { tile: 5, epoch: 2, home: 3, pixel: 61 };
 
 fn walker(stack: &mut Stack) -> Walker<'_> {
     Walker { kernels: Kernels::Portable, stack, counts: Default::default() }
@@ -56,7 +56,8 @@ fn primary(origin: Vec3, direction: Vec3, id: u64) -> RayRecord {
         pixel: ORIGIN.pixel,
         tile: ORIGIN.tile,
         epoch: ORIGIN.epoch,
-        sample: ORIGIN.sample,
+        home: ORIGIN.home,
+        page: RayRecord::FROM_ROOT,
         kind: RayKind::Primary as u8,
         depth: 1,
         ..bytemuck::Zeroable::zeroed()
@@ -69,54 +70,14 @@ fn trace(scene: &Scene<'_>, ray: &RayRecord, records: usize) -> (Record, Counts)
     let mut room = vec![HitRecord::EMPTY; records];
     let mut lane = Lane::new(&mut room);
     let mut walker = walker(&mut stack);
-    let hit = walker.nearest(scene, &ray.ray());
-    lane.start(scene, ray, &hit, &mut record, &mut counts);
+    assert_eq!(lane.take(scene, &mut walker, *ray, &mut record, &mut counts), None, "every page is at hand");
     let mut steps = 0;
     while !lane.is_empty() {
-        lane.step(scene, &mut walker, &mut record, &mut counts);
+        assert_eq!(lane.step(scene, &mut walker, &mut record, &mut counts), None, "every page is at hand");
         steps += 1;
         assert!(steps < 10_000_000, "a lane comes to an end");
     }
     (record, counts)
-}
-
-/// A floor, a mirror ball, a glass ball around a smaller ball, a cone of tinted glass; a lamp, a sphere light, a far one.
-fn hall() -> World {
-    let glass = Material {
-        transmission: [0.9, 0.95, 1.0],
-        mirror: [0.05; 3],
-        ior: 1.5,
-        flags: Material::FRESNEL,
-        specular: [0.5; 3],
-        highlight: 1,
-        exponent: 30.0,
-        ..Material::MATT
-    };
-    let materials = vec![
-        Material { ambient: [0.5; 3], ..Material::MATT },
-        Material { mirror: [0.8, 0.7, 0.6], diffuse: [0.1; 3], emission: [0.01; 3], ..Material::MATT },
-        glass,
-        Material { transmission: [0.25, 0.5, 0.75], ior: 1.1, ..Material::MATT },
-    ];
-    let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z);
-    let sphere = |x: f32, y: f32, radius| Shape::Sphere(Sphere { centre: Vec3::new(x, y, 0.0), radius });
-    let cone =
-        Cone { base: Vec3::new(0.0, 0.3, 0.5), base_radius: 0.2, apex: Vec3::new(0.1, 0.8, 0.6), apex_radius: 0.05 };
-    let shapes = vec![
-        (Shape::Triangle(Triangle { v: [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)] }), 0),
-        (Shape::Triangle(Triangle { v: [corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0)] }), 0),
-        (sphere(-0.4, 0.3, 0.28), 1),
-        (sphere(0.4, 0.3, 0.28), 2),
-        (sphere(0.4, 0.3, 0.1), 1),
-        (Shape::Cone(cone), 3),
-    ];
-    let colour = [1.0, 0.9, 0.8];
-    let lights = vec![
-        Light { position: [0.0, 2.0, 0.0], colour, ..Light::default() },
-        Light { position: [1.0, 1.5, 1.0], colour, kind: 3, radius: 0.2, samples: 3, ..Light::default() },
-        Light { axis: [0.6, -0.8, 0.0], colour, kind: 1, ..Light::default() },
-    ];
-    World::new(shapes, materials, lights)
 }
 
 fn through_the_hall(count: u32) -> impl Iterator<Item = RayRecord> {
@@ -128,10 +89,32 @@ fn through_the_hall(count: u32) -> impl Iterator<Item = RayRecord> {
     })
 }
 
+fn nearest(scene: &Scene<'_>, ray: &Ray) -> walk::Hit {
+    walk::nearest(Kernels::Portable, &scene.resident, ray, &mut Stack::new(), &mut walk::Counts::default())
+}
+
+/// What of a shadow ray arrives, surface by surface: the end of the ray is worked out again at each from where it is then.
+fn arriving_by_hand(scene: &Scene<'_>, ray: &Ray, weight: [f32; 3]) -> [f32; 3] {
+    let hit = nearest(scene, ray);
+    if !hit.candidate.is_hit() {
+        return weight;
+    }
+    let record = RayRecord {
+        origin: ray.origin.to_array(),
+        direction: ray.direction.to_array(),
+        t_max: hit.candidate.t,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let place = surface(&scene.resident.pages[hit.page as usize], &record, &hit).unwrap();
+    let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, weight) else { return [0.0; 3] };
+    let end = ray.origin + ray.direction * ray.t_max;
+    let direction = if ray.t_max < f32::INFINITY { (end - origin) / ray.t_max } else { ray.direction };
+    arriving_by_hand(scene, &Ray { origin, direction, ..*ray }, rest)
+}
+
 /// All rays of a tree by a queue, not a stack, in the crates below the tracer: what a lane must agree with.
 fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
-    let (mut stack, mut queue) = (Stack::new(), std::collections::VecDeque::from([*primary]));
-    let mut walker = walker(&mut stack);
+    let mut queue = std::collections::VecDeque::from([*primary]);
     let mut found = Vec::new();
     let mut add = |radiance: [f32; 3]| {
         if radiance != [0.0; 3] {
@@ -139,12 +122,12 @@ fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
         }
     };
     while let Some(ray) = queue.pop_front() {
-        let hit = walker.nearest(scene, &ray.ray());
+        let hit = nearest(scene, &ray.ray());
         if !hit.candidate.is_hit() {
             add([0, 1, 2].map(|c| ray.weight[c] * scene.background[c]));
             continue;
         }
-        let place = surface(&scene.resident.pages[hit.page as usize], &ray, &hit);
+        let place = surface(&scene.resident.pages[hit.page as usize], &ray, &hit).unwrap();
         add(spawn::local(&scene.shading, &place, ray.weight));
         for cursor in 0..spawn::children(&scene.shading, &place) {
             let depth = ray.depth.into();
@@ -152,7 +135,7 @@ fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
                 match spawn::child(&scene.shading, &place, ray.weight, depth, ray.id, cursor) {
                     spawn::Child::None => continue,
                     spawn::Child::Shadow { origin, direction, t_max, contribution, .. } => {
-                        add(walker.arriving(scene, &Ray { origin, direction, t_min: 0.0, t_max }, contribution));
+                        add(arriving_by_hand(scene, &Ray { origin, direction, t_min: 0.0, t_max }, contribution));
                         continue;
                     }
                     spawn::Child::Mirror { origin, direction, weight, medium, branch } => {
@@ -216,11 +199,13 @@ fn a_ledger_with_a_fault_stays_open() {
             let (mut sink, mut counts, mut stack) = (Faulty(ray.id, 0, [0; 2]), Counts::default(), Stack::new());
             let mut room = [HitRecord::EMPTY; 5];
             let (mut lane, mut walker) = (Lane::new(&mut room), walker(&mut stack));
-            let hit = walker.nearest(scene, &ray.ray());
-            lane.start(scene, &ray, &hit, &mut sink, &mut counts);
+            let mut known = ray;
+            let hit = walker.nearest(scene, &mut known).expect("every page is at hand");
+            assert_eq!((known.settled, known.page, known.t_max), (1, hit.page, hit.candidate.t));
+            lane.start(scene, &known, &hit, &mut sink, &mut counts);
             while !lane.is_empty() {
                 assert_ne!(sink.0, 0, "not zero before the tree has ended");
-                lane.step(scene, &mut walker, &mut sink, &mut counts);
+                assert_eq!(lane.step(scene, &mut walker, &mut sink, &mut counts), None);
             }
             let last = sink.2[(sink.1 % 2) as usize];
             assert_eq!(sink.0, 0);
@@ -298,13 +283,28 @@ fn sheets(transmissions: &[[f32; 3]]) -> World {
     World::new(shapes, materials, vec![lamp])
 }
 
+/// A shadow ray as a lane makes them.
+fn shadow(origin: Vec3, direction: Vec3, t_max: f32, weight: [f32; 3]) -> RayRecord {
+    RayRecord {
+        origin: origin.to_array(),
+        direction: direction.to_array(),
+        t_max,
+        t_end: t_max,
+        weight,
+        primitive: Candidate::NOTHING,
+        page: RayRecord::FROM_ROOT,
+        kind: RayKind::Shadow as u8,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
 /// What of `[1, 0.5, 0.25]` arrives at the floor through the sheets.
 fn arriving(transmissions: &[[f32; 3]]) -> [f32; 3] {
     sheets(transmissions).with(|scene| {
         let mut stack = Stack::new();
         let from = Vec3::new(-0.1, 0.5 / (transmissions.len() as f32 + 2.0), -0.3);
-        let ray = Ray { origin: from, direction: Vec3::new(0.2, 3.0, 0.1) - from, t_min: 0.0, t_max: 1.0 };
-        walker(&mut stack).arriving(scene, &ray, [1.0, 0.5, 0.25])
+        let mut ray = shadow(from, Vec3::new(0.2, 3.0, 0.1) - from, 1.0, [1.0, 0.5, 0.25]);
+        walker(&mut stack).arriving(scene, &mut ray).expect("every page is at hand")
     })
 }
 
@@ -343,8 +343,8 @@ fn shadows_of_a_glass_ball() {
     world.with(|scene| {
         let mut stack = Stack::new();
         let mut up = |x: f32, t_max: f32| {
-            let ray = Ray { origin: Vec3::X * x, direction: Vec3::Y * 2.0, t_min: 0.0, t_max };
-            walker(&mut stack).arriving(scene, &ray, [1.0; 3])
+            let mut ray = shadow(Vec3::X * x, Vec3::Y * 2.0, t_max, [1.0; 3]);
+            walker(&mut stack).arriving(scene, &mut ray).expect("every page is at hand")
         };
         assert_eq!(up(0.1, 1.0), [0.25, 0.0625, 1.0], "in and out");
         assert_eq!(up(0.1, 0.5), [0.5, 0.25, 1.0], "a light inside");

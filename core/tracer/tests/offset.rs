@@ -50,18 +50,20 @@ fn check(name: &str, rounds: usize, both_sides: bool, mut make: impl FnMut(&mut 
         World::new(vec![(shape, 0)], vec![Material::MATT], vec![]).with(|scene| {
             let mut stack = Stack::new();
             let mut walker = Walker { kernels: Kernels::Portable, stack: &mut stack, counts: Default::default() };
-            let record = RayRecord {
+            let mut record = RayRecord {
                 origin: origin.to_array(),
                 direction: direction.to_array(),
                 t_max: f32::INFINITY,
+                primitive: Candidate::NOTHING,
+                page: RayRecord::FROM_ROOT,
                 ..bytemuck::Zeroable::zeroed()
             };
-            let found = walker.nearest(scene, &record.ray());
+            let found = walker.nearest(scene, &mut record).expect("every page is at hand");
             if !found.candidate.is_hit() {
                 return;
             }
             hits += 1;
-            let place = surface(&scene.resident.pages[found.page as usize], &record, &found);
+            let place = surface(&scene.resident.pages[found.page as usize], &record, &found).unwrap();
             for side in if both_sides { &[1.0, -1.0][..] } else { &[1.0] } {
                 let normal = place.geometric_normal * *side;
                 let start = offset_origin(place.position, place.error, normal, normal);

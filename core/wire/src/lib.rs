@@ -8,9 +8,11 @@ mod message;
 mod record;
 mod tiles;
 
-pub use message::{Counts, Frame, MESSAGE_BYTES_MAX, Message, View, WireError, decode, encode};
-pub use record::{RayKind, RayRecord, ShadowRecord};
+pub use message::{
+    BODY_BYTES_MAX, Counts, Frame, HEAD_BYTES_MAX, MESSAGE_BYTES_MAX, Message, View, WireError, decode, encode,
+};
+pub use record::{Partial, RayKind, RayRecord, ShadowRecord};
 pub use tiles::{TILE, Tile, TileMap};
 
 /// Version of everything in this crate: peers with another one are refused.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;

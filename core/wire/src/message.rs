@@ -1,6 +1,6 @@
 //! Messages: a small head (postcard), then a body whose length the head determines.
 
-use crate::TILE;
+use crate::{Partial, RayRecord, ShadowRecord, TILE};
 use serde::{Deserialize, Serialize};
 
 /// What every node must know of a picture before it traces a ray. Lengths are internal units.
@@ -135,10 +135,57 @@ pub enum Message {
     },
     /// Host to all: the program ends; send nothing more.
     Stop,
+    /// Node to node: rays for pages that you have, [`crate::RayRecord`]s and then [`crate::ShadowRecord`]s. The sender
+    /// keeps them until it hears [`Message::Took`], and sends this peer no others before.
+    Rays {
+        /// Records of the first kind.
+        rays: u16,
+        /// Records of the second.
+        shadows: u16,
+        /// Rays that wait at the sender.
+        load: u16,
+    },
+    /// Node to node: the answer to [`Message::Rays`].
+    Took {
+        /// Whether there was room for them: if not, they are still yours.
+        taken: bool,
+        /// Rays that wait here.
+        load: u16,
+    },
+    /// Node to node: adds to tiles that you keep. The body is [`crate::Partial`]s.
+    Partials {
+        /// How many.
+        count: u16,
+    },
+    /// Node to node: send me this page; a place is reserved for it.
+    Fetch {
+        /// Its number.
+        page: u32,
+    },
+    /// Node to node: a part of a page that was asked for; parts come in order.
+    Part {
+        /// The page.
+        page: u32,
+        /// Where in it the body belongs.
+        offset: u32,
+        /// Bytes of the body; none if the sender has no such page.
+        bytes: u16,
+    },
+    /// Dispatcher to node: no tiles are left, and this node has nothing to do: send it some of your rays.
+    Share {
+        /// Who.
+        with: u16,
+    },
+    /// Node to dispatcher: what others shared with me is done.
+    Idle,
 }
 
-/// Bytes of the longest message: a head, and a body of 64 pixels.
-pub const MESSAGE_BYTES_MAX: usize = 128 + (TILE * TILE) as usize * 24;
+/// Bytes of the longest head.
+pub const HEAD_BYTES_MAX: usize = 128;
+/// Bytes of the longest body.
+pub const BODY_BYTES_MAX: usize = 16 * 1024;
+/// Bytes of the longest message.
+pub const MESSAGE_BYTES_MAX: usize = HEAD_BYTES_MAX + BODY_BYTES_MAX;
 
 /// Why bytes are no message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -164,7 +211,7 @@ pub enum WireError {
 pub struct View<'a> {
     /// The head.
     pub message: Message,
-    /// Red, green and blue of a tile's pixels; empty for other messages.
+    /// What the head announces; empty for most messages.
     pub body: &'a [u8],
 }
 
@@ -174,6 +221,11 @@ impl Message {
     pub const fn body_bytes(&self) -> usize {
         match self {
             Self::Contributions { width, height, .. } => *width as usize * *height as usize * 24,
+            Self::Rays { rays, shadows, .. } => {
+                *rays as usize * size_of::<RayRecord>() + *shadows as usize * size_of::<ShadowRecord>()
+            }
+            Self::Partials { count } => *count as usize * size_of::<Partial>(),
+            Self::Part { bytes, .. } => *bytes as usize,
             _ => 0,
         }
     }
@@ -200,6 +252,9 @@ pub fn decode(bytes: &[u8]) -> Result<View<'_>, WireError> {
     if let Message::Contributions { width, height, .. } = message
         && (u32::from(width) > TILE || u32::from(height) > TILE)
     {
+        return Err(WireError::Head);
+    }
+    if message.body_bytes() > BODY_BYTES_MAX {
         return Err(WireError::Head);
     }
     if body.len() != message.body_bytes() {
@@ -268,8 +323,116 @@ mod tests {
         };
         check(Message::Report { counts, tiles: u32::MAX, runs: u32::MAX, busy_nanoseconds: most });
         check(Message::Stop);
+        check(Message::Rays { rays: 100, shadows: 100, load: u16::MAX });
+        check(Message::Took { taken: false, load: u16::MAX });
+        check(Message::Partials { count: 400 });
+        check(Message::Share { with: u16::MAX });
+        check(Message::Idle);
+        check(Message::Fetch { page: u32::MAX });
+        check(Message::Part { page: u32::MAX, offset: u32::MAX, bytes: 4096 });
+        check(Message::Rays { rays: 186, shadows: 0, load: 0 });
+        check(Message::Rays { rays: 0, shadows: 256, load: 0 });
+        check(Message::Rays { rays: 0, shadows: 0, load: 0 });
+        check(Message::Took { taken: true, load: 0 });
+        check(Message::Partials { count: 409 });
+        check(Message::Part { page: 0, offset: 0, bytes: 0 });
+        check(Message::Part { page: 0, offset: 65_535, bytes: 16_384 });
         assert_eq!(decode(&[]), Err(WireError::Head));
         assert_eq!(decode(&[200]), Err(WireError::Head));
+    }
+
+    /// The examples of docs/WIRE.md.
+    #[test]
+    fn heads_are_as_the_specification_has_them() {
+        let check = |message: Message, expected: &[u8]| {
+            let mut room = [0; MESSAGE_BYTES_MAX];
+            let used = encode(&message, &mut room, |_| {}).unwrap();
+            assert_eq!(&room[..expected.len()], expected, "{message:?}");
+            assert_eq!(used, expected.len() + message.body_bytes(), "{message:?}");
+        };
+        let scene = 0x0123_4567_89ab_cdef;
+        check(Message::Hello { version: 2, scene }, &[0, 2, 0xef, 0x9b, 0xaf, 0xcd, 0xf8, 0xac, 0xd1, 0x91, 1]);
+        check(Message::Tiles { first: 1172, count: 300, epoch: 0 }, &[2, 0x94, 9, 0xac, 2, 0]);
+        check(Message::Rays { rays: 100, shadows: 3, load: 300 }, &[9, 100, 3, 0xac, 2]);
+        check(Message::Took { taken: true, load: 0 }, &[10, 1, 0]);
+        check(Message::Partials { count: 409 }, &[11, 0x99, 3]);
+        check(Message::Fetch { page: 1172 }, &[12, 0x94, 9]);
+        check(Message::Part { page: 1172, offset: 4096, bytes: 4096 }, &[13, 0x94, 9, 0x80, 0x20, 0x80, 0x20]);
+        let body = |message: Message| message.body_bytes();
+        assert_eq!(body(Message::Rays { rays: 100, shadows: 3, load: 300 }), 8992);
+        assert_eq!(body(Message::Partials { count: 409 }), 16_360);
+    }
+
+    /// Bodies that are too long are refused, though they be as long as their heads say.
+    #[test]
+    fn bodies_have_an_end() {
+        let check = |message: Message, taken: bool| {
+            let mut room = [0; 96 * 1024];
+            let bytes = message.body_bytes();
+            let head = postcard::to_slice(&message, &mut room).unwrap().len();
+            let decoded = decode(&room[..(head + bytes).min(96 * 1024)]);
+            match taken {
+                true => assert_eq!(decoded.map(|view| view.body.len()), Ok(bytes), "{message:?}"),
+                false => assert_eq!(decoded, Err(WireError::Head), "{message:?}"),
+            }
+            // With another body it is none in any case.
+            assert!(decode(&room[..head + (bytes / 2).min(1000)]).is_err(), "{message:?}");
+        };
+        check(Message::Rays { rays: 186, shadows: 0, load: 0 }, true);
+        check(Message::Rays { rays: 187, shadows: 0, load: 0 }, false);
+        check(Message::Rays { rays: 186, shadows: 1, load: 0 }, false);
+        check(Message::Rays { rays: 0, shadows: 256, load: 0 }, true);
+        check(Message::Rays { rays: 0, shadows: 257, load: 0 }, false);
+        check(Message::Rays { rays: u16::MAX, shadows: 1, load: 0 }, false);
+        check(Message::Partials { count: 409 }, true);
+        check(Message::Partials { count: 410 }, false);
+        check(Message::Partials { count: u16::MAX }, false);
+        check(Message::Part { page: 0, offset: 0, bytes: 16_384 }, true);
+        check(Message::Part { page: 0, offset: 0, bytes: 16_385 }, false);
+        check(Message::Part { page: 0, offset: 0, bytes: u16::MAX }, false);
+        let tile = |width, height| Message::Contributions { tile: 0, epoch: 0, width, height, rays: 0, entry: 0 };
+        check(tile(8, 8), true);
+        check(tile(9, 8), false);
+        check(tile(255, 255), false);
+    }
+
+    /// Messages with bodies, of which bits are changed, or the end is cut off or drawn out.
+    #[test]
+    fn mutated_messages_are_refused_calmly() {
+        let mut state = 7u64;
+        let mut next = |end: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % end
+        };
+        let (mut taken, mut refused) = (0, 0);
+        for _ in 0..40_000 {
+            let small = next(4) as u16;
+            let message = match next(6) {
+                0 => Message::Rays { rays: small, shadows: next(4) as u16, load: next(65_536) as u16 },
+                1 => Message::Partials { count: small },
+                2 => Message::Part { page: next(1 << 32) as u32, offset: next(70_000) as u32, bytes: 100 * small },
+                3 => Message::Took { taken: small > 1, load: small },
+                4 => Message::Fetch { page: next(1 << 32) as u32 },
+                _ => {
+                    Message::Contributions { tile: 1, epoch: 0, width: small as u8, height: 8, rays: 9, entry: 1 << 60 }
+                }
+            };
+            let mut room = [0; 2048];
+            let mut used = encode(&message, &mut room, |body| body.fill(0x80)).unwrap();
+            match next(4) {
+                0 => used = next(used as u64 + 1) as usize,
+                1 => used += next(9) as usize,
+                _ => (0..=next(3)).for_each(|_| room[next(used.min(16) as u64) as usize] ^= 1 << next(8)),
+            }
+            match decode(&room[..used]) {
+                Ok(view) => {
+                    assert_eq!(view.body.len(), view.message.body_bytes());
+                    taken += 1;
+                }
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(taken > 1000 && refused > 1000, "some of each: {taken} taken, {refused} refused");
     }
 
     /// Any bytes: an error or a message, never a panic (a small fuzzer; the seed is the loop variable).
@@ -283,7 +446,7 @@ mod tests {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 *b = (state >> 56) as u8;
             }
-            bytes[0] %= 10;
+            bytes[0] %= 17;
             taken += u32::from(decode(&bytes[..(round % 49) as usize]).is_ok());
         }
         assert!(taken > 100, "some noise is a message: {taken}");

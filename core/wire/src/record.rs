@@ -17,13 +17,16 @@ pub enum RayKind {
     Shadow = 3,
 }
 
-/// A nearest-hit ray: 88 bytes.
+/// A ray that waits or travels: 88 bytes.
+///
+/// A shadow ray is one too while it waits, with what it would add to the film for its weight; where nothing lets light
+/// through it travels as a [`ShadowRecord`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RayRecord {
     /// Where it starts, internal units.
     pub origin: [f32; 3],
-    /// Unit vector.
+    /// Unit vector; of a shadow ray, the whole way to a light at a place.
     pub direction: [f32; 3],
     /// Start of the interval.
     pub t_min: f32,
@@ -37,31 +40,35 @@ pub struct RayRecord {
     pub hit_page: u32,
     /// What it adds to the film is multiplied by this.
     pub weight: [f32; 3],
-    /// `y * width + x`.
-    pub pixel: u32,
+    /// Of a shadow ray that looks for what lets light through: its end, just before the light.
+    pub t_end: f32,
     /// Number of the tile.
     pub tile: u32,
-    /// The page that it needs next.
+    /// The page that it needs next; [`RayRecord::FROM_ROOT`] before it has met any.
     pub page: u32,
     /// The tile's epoch.
     pub epoch: u16,
-    /// Sample of the pixel.
-    pub sample: u16,
+    /// The node that keeps the tile's sums.
+    pub home: u16,
     /// Place of the best hit in its page.
     pub slot: u16,
     /// What it travels in: 0 outside, else a material's number plus 1.
     pub medium: u16,
+    /// Surfaces that a shadow ray has passed.
+    pub passed: u16,
+    /// Number of the pixel in its tile, row by row.
+    pub pixel: u8,
     /// [`RayKind`] as a number.
     pub kind: u8,
-    /// 1 for primary rays.
+    /// 1 for primary rays; of a shadow ray, that of the hit that sent it.
     pub depth: u8,
+    /// 1: the best hit is the nearest, and `page` is where it is to be shaded. Else 0.
+    pub settled: u8,
     /// Zero.
     pub reserved: u16,
-    /// Radius of its footprint at the origin.
-    pub footprint: f32,
 }
 
-/// A shadow ray: 64 bytes. It starts outside all error bounds, so its interval starts at 0.
+/// A shadow ray that anything ends: 64 bytes. It starts outside all error bounds, so its interval starts at 0.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ShadowRecord {
@@ -71,28 +78,52 @@ pub struct ShadowRecord {
     pub direction: [f32; 3],
     /// End of the interval, just before the light.
     pub t_max: f32,
-    /// `y * width + x`.
-    pub pixel: u32,
+    /// The node that keeps the tile's sums.
+    pub home: u16,
+    /// Number of the pixel in its tile, row by row.
+    pub pixel: u8,
+    /// Depth of the hit that sent it.
+    pub depth: u8,
     /// Names the ray in the ledger.
     pub id: u64,
     /// What it adds to the film if nothing is in the way.
     pub contribution: [f32; 3],
     /// Number of the tile.
     pub tile: u32,
-    /// The page that it needs next. Its tile's epoch goes with the frame.
+    /// The page that it needs next.
     pub page: u32,
     /// The tile's epoch.
     pub epoch: u16,
-    /// Depth of the hit that sent it.
-    pub depth: u8,
+    /// Zero.
+    pub reserved: u16,
+}
+
+/// What rays added to one pixel of a tile whose sums are at another node: 40 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Partial {
+    /// Red, green and blue, steps of the film.
+    pub sums: [u64; 3],
+    /// Sum of the ledger entries of rays that ended.
+    pub entry: u64,
+    /// Number of the tile.
+    pub tile: u32,
+    /// The tile's epoch.
+    pub epoch: u16,
+    /// Number of the pixel in its tile, row by row.
+    pub pixel: u8,
     /// Zero.
     pub reserved: u8,
 }
 
 const _: () = assert!(size_of::<RayRecord>() == 88 && align_of::<RayRecord>() == 8);
 const _: () = assert!(size_of::<ShadowRecord>() == 64 && align_of::<ShadowRecord>() == 8);
+const _: () = assert!(size_of::<Partial>() == 40 && align_of::<Partial>() == 8);
 
 impl RayRecord {
+    /// The page of a ray that has met none.
+    pub const FROM_ROOT: u32 = u32::MAX;
+
     /// The ray, up to its best hit.
     #[must_use]
     pub fn ray(&self) -> Ray {
@@ -104,6 +135,17 @@ impl RayRecord {
         }
     }
 
+    /// What it is for; a number that is none of them counts as a shadow ray.
+    #[must_use]
+    pub const fn ray_kind(&self) -> RayKind {
+        match self.kind {
+            0 => RayKind::Primary,
+            1 => RayKind::Mirror,
+            2 => RayKind::Refract,
+            _ => RayKind::Shadow,
+        }
+    }
+
     /// The best hit so far.
     #[must_use]
     pub fn candidate(&self) -> Candidate {
@@ -111,15 +153,88 @@ impl RayRecord {
     }
 }
 
-impl ShadowRecord {
-    /// The ray.
-    #[must_use]
-    pub fn ray(&self) -> Ray {
-        Ray {
-            origin: Vec3::from_array(self.origin),
-            direction: Vec3::from_array(self.direction),
-            t_min: 0.0,
-            t_max: self.t_max,
+impl From<&RayRecord> for ShadowRecord {
+    fn from(ray: &RayRecord) -> Self {
+        Self {
+            origin: ray.origin,
+            direction: ray.direction,
+            t_max: ray.t_max,
+            home: ray.home,
+            pixel: ray.pixel,
+            depth: ray.depth,
+            id: ray.id,
+            contribution: ray.weight,
+            tile: ray.tile,
+            page: ray.page,
+            epoch: ray.epoch,
+            reserved: 0,
         }
+    }
+}
+
+impl From<&ShadowRecord> for RayRecord {
+    fn from(shadow: &ShadowRecord) -> Self {
+        Self {
+            origin: shadow.origin,
+            direction: shadow.direction,
+            t_max: shadow.t_max,
+            home: shadow.home,
+            pixel: shadow.pixel,
+            depth: shadow.depth,
+            id: shadow.id,
+            weight: shadow.contribution,
+            tile: shadow.tile,
+            page: shadow.page,
+            epoch: shadow.epoch,
+            primitive: Candidate::NOTHING,
+            kind: RayKind::Shadow as u8,
+            ..Self::zeroed()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::mem::offset_of;
+
+    /// The tables of docs/WIRE.md.
+    #[test]
+    fn fields_stand_where_the_specification_has_them() {
+        macro_rules! at {
+            ($record:ident: $($field:ident $offset:literal),*) => {
+                $(assert_eq!(offset_of!($record, $field), $offset, stringify!($record, $field));)*
+            };
+        }
+        at!(RayRecord: origin 0, direction 12, t_min 24, t_max 28, id 32, primitive 40, hit_page 44, weight 48, t_end 60,
+            tile 64, page 68, epoch 72, home 74, slot 76, medium 78, passed 80, pixel 82, kind 83, depth 84, settled 85,
+            reserved 86);
+        at!(ShadowRecord: origin 0, direction 12, t_max 24, home 28, pixel 30, depth 31, id 32, contribution 40, tile 52,
+            page 56, epoch 60, reserved 62);
+        at!(Partial: sums 0, entry 24, tile 32, epoch 36, pixel 38, reserved 39);
+    }
+
+    /// What a short record leaves out is what every shadow ray has alike where nothing lets light through.
+    #[test]
+    fn shadow_rays_come_back_from_their_short_record() {
+        let short = ShadowRecord {
+            origin: [1.0, 2.0, 3.0],
+            direction: [4.0, 5.0, 6.0],
+            t_max: 0.75,
+            home: 7,
+            pixel: 8,
+            depth: 9,
+            id: 10,
+            contribution: [11.0, 12.0, 13.0],
+            tile: 14,
+            page: 15,
+            epoch: 16,
+            reserved: 0,
+        };
+        let ray = RayRecord::from(&short);
+        assert_eq!(ShadowRecord::from(&ray), short);
+        assert_eq!((ray.ray_kind(), ray.primitive, ray.t_min), (RayKind::Shadow, Candidate::NOTHING, 0.0));
+        assert_eq!((ray.settled, ray.passed, ray.medium, ray.reserved), (0, 0, 0, 0));
+        assert_eq!((ray.weight, ray.t_max, ray.page), (short.contribution, 0.75, 15));
     }
 }

@@ -1,5 +1,5 @@
 //! Scenes that the program makes itself, for trying things out and for measuring, without a file: `spd:balls:4`,
-//! `terrain:1000000`, `cornell`, `organic`.
+//! `terrain:1000000`, `cornell`, `organic`, `paper:balls`.
 //!
 //! A scene is the same on every machine, to the last bit: it is computed with basic arithmetic and `libm`, in one
 //! order. Nothing here reads a file or a clock.
@@ -7,6 +7,7 @@
 mod cornell;
 mod noise;
 mod organic;
+mod paper;
 mod spd;
 mod strip;
 mod terrain;
@@ -103,6 +104,16 @@ pub fn builtin(name: &str) -> Option<Result<Model, BuiltinError>> {
     SCENES.iter().any(|s| family_of(s.name) == family).then(|| make(name, family))
 }
 
+/// A scene that can be made piece by piece, if `name` is one: the model without its primitives, and those.
+pub(crate) fn streamed(name: &str) -> Option<(Model, terrain::Triangles)> {
+    let size = SCENES.iter().find(|scene| scene.name == "terrain")?.size?;
+    let triangles = match name.strip_prefix("terrain")? {
+        "" => size.default,
+        given => given.strip_prefix(':')?.parse().ok()?,
+    };
+    (size.smallest..=size.largest).contains(&triangles).then(|| terrain::streamed(triangles))
+}
+
 fn family_of(name: &str) -> &str {
     name.split_once(':').map_or(name, |(family, _)| family)
 }
@@ -161,7 +172,7 @@ const fn fixed(name: &'static str, about: &'static str, make: fn() -> Model) -> 
     BuiltinScene { name, about, size: None, make: Maker::Fixed(make) }
 }
 
-static SCENES: [BuiltinScene; 14] = [
+static SCENES: [BuiltinScene; 20] = [
     sized("spd:balls", "SPD: the sphereflake over a square", spd::balls, "levels of spheres", [1, 4, 7]),
     sized("spd:balls-noground", "SPD: the sphereflake alone", spd::balls_noground, "levels of spheres", [1, 4, 7]),
     sized("spd:gears", "SPD: meshed gears, some of them clear", spd::gears, "gears along each side", [1, 4, 32]),
@@ -176,6 +187,24 @@ static SCENES: [BuiltinScene; 14] = [
     fixed("cornell", "the Cornell box with its two blocks", cornell::blocks),
     fixed("cornell:mirror", "the Cornell box with a mirror and a glass sphere", cornell::spheres),
     sized("organic", "a closed knotted tube", organic::organic, "triangles", [200, 70_000, PRIMITIVES_MAX]),
+    sized(
+        "paper:balls",
+        "1995: 7,381 balls, the ten largest matt",
+        paper::balls,
+        "1 + levels that are matt",
+        [1, 3, 6],
+    ),
+    sized(
+        "paper:balls5",
+        "1995: 66,430 balls, the ten largest matt",
+        paper::balls5,
+        "1 + levels that are matt",
+        [1, 3, 7],
+    ),
+    fixed("paper:teapot", "1995: the teapot on a matt checkerboard", paper::teapot),
+    sized("paper:conference", "1995: like its conference room", paper::conference, "lights", [1, 8, 30]),
+    fixed("paper:hof", "POV||Ray: like its ROSENTHALERHOF, a courtyard", paper::hof),
+    fixed("paper:vase", "POV||Ray: like its SKYVASE", paper::vase),
 ];
 
 #[cfg(test)]
@@ -247,6 +276,9 @@ mod tests {
             "spd:tree" => 2 + 2 * ((2 << n) - 1),
             "terrain" => n,
             "organic" => n / 2 * 2,
+            "paper:balls" => 7_381,
+            "paper:balls5" => 66_430,
+            "paper:conference" => 23_966,
             other => panic!("{other}"),
         }
     }
@@ -298,6 +330,11 @@ mod tests {
             ("cornell", 0x49D0_8CAD_7038_66B5),
             ("cornell:mirror", 0x5A68_7898_14A4_172F),
             ("organic:2000", 0x96F8_FACF_246E_DC85),
+            ("paper:balls", 0x13C2_FEB6_86A3_31D6),
+            ("paper:teapot", 0xC5E0_6D2C_11E7_9640),
+            ("paper:conference", 0x9DEE_4909_1D3D_4991),
+            ("paper:hof", 0xCD45_480A_C288_0EC9),
+            ("paper:vase", 0xE164_E2DB_FECB_0F01),
         ];
         let found = expected.map(|(name, _)| {
             let model = builtin(name).expect("built in").expect("in range");

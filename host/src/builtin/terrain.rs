@@ -3,13 +3,19 @@
 use super::noise::ridges;
 use super::strip::{Row, strip};
 use super::vector::{V, narrow, unit};
-use crate::model::{CameraSpec, Mesh, Model, Objects};
+use crate::build::{Object, Objects};
+use crate::model::{self, CameraSpec, Mesh, Model};
 use hybray_shading::{Light, LightKind, Material};
 
 /// Widest lattice cell of the noise, as a share of the terrain's side.
 const COARSEST: f64 = 1.0 / 5.0;
 /// Height of one unit of noise; the terrain's side is 2.
 const RELIEF: f64 = 0.17;
+
+/// The terrain without its triangles, and those one after the other.
+pub fn streamed(triangles: u32) -> (Model, Triangles) {
+    (about(triangles), Triangles(triangles))
+}
 
 /// A square of exactly `triangles` triangles, over x and y from -1 to 1, z up.
 ///
@@ -18,18 +24,23 @@ const RELIEF: f64 = 0.17;
 /// and triangles are made in order into room of the exact size, and nothing else is allocated.
 /// 20,000,000 triangles take 360 MB, mesh and peak alike, and 2.9 s on one core of an AMD EPYC.
 pub fn terrain(triangles: u32) -> Model {
+    let mut model = about(triangles);
+    model.meshes.push(Mesh { name: "terrain".to_owned(), material: 0, ..sheet(triangles) });
+    model
+}
+
+fn about(triangles: u32) -> Model {
     let ground = [0.42, 0.40, 0.30];
     let mut model = Model {
         lights: vec![sun()],
         cameras: vec![camera()],
         background: [0.45, 0.62, 0.85],
         ambient: [0.12, 0.15, 0.20],
-        objects: Objects { polygons: u64::from(triangles), ..Objects::default() },
+        objects: model::Objects { polygons: u64::from(triangles), ..model::Objects::default() },
         ..Model::default()
     };
     let material = Material { diffuse: ground, ambient: ground, ..Material::MATT };
-    let material = model.add_material("ground", material);
-    model.meshes.push(Mesh { name: "terrain".to_owned(), material, ..sheet(triangles) });
+    model.add_material("ground", material);
     model
 }
 
@@ -82,15 +93,55 @@ impl Plan {
     fn vertices(&self) -> usize {
         (0..=self.strips).map(|i| self.row(i) as usize + 1).sum()
     }
+
+    /// The finest octave has two cells or more to a lattice cell: finer would only be sampled badly.
+    fn octaves(&self) -> u32 {
+        let mut octaves = 1;
+        while octaves < 14 && f64::from(2_u32 << octaves) <= f64::from(self.strips) * COARSEST {
+            octaves += 1;
+        }
+        octaves
+    }
+
+    /// The vertices of row `i`.
+    fn points(&self, i: u32, octaves: u32) -> impl Iterator<Item = [f32; 3]> {
+        let (segments, v) = (self.row(i), f64::from(i) / f64::from(self.strips));
+        (0..=segments).map(move |j| narrow(place(f64::from(j) / f64::from(segments), v, octaves)))
+    }
+}
+
+/// A terrain's triangles, made while they are told: two rows of vertices are all that is held.
+pub struct Triangles(u32);
+
+impl Objects for Triangles {
+    fn len(&self) -> u64 {
+        u64::from(self.0)
+    }
+
+    fn each<E>(&self, mut tell: impl FnMut(&Object) -> Result<(), E>) -> Result<(), E> {
+        let plan = Plan::new(self.0);
+        let octaves = plan.octaves();
+        let (mut points, mut triangles, mut id) = (Vec::new(), Vec::new(), 0);
+        points.extend(plan.points(0, octaves));
+        for i in 1..=plan.strips {
+            let below = points.len() as u32;
+            points.extend(plan.points(i, octaves));
+            let rows = [(0, i - 1), (below, i)].map(|(first, row)| Row { first, segments: plan.row(row) });
+            triangles.clear();
+            strip(rows[0], rows[1], false, i, &mut triangles);
+            for t in &triangles {
+                tell(&Object::triangle(id, 0, t.map(|vertex| points[vertex as usize]), None))?;
+                id += 1;
+            }
+            points.drain(..below as usize);
+        }
+        Ok(())
+    }
 }
 
 fn sheet(triangles: u32) -> Mesh {
     let plan = Plan::new(triangles);
-    // The finest octave has two cells or more to a lattice cell: finer would only be sampled badly.
-    let mut octaves = 1;
-    while octaves < 14 && f64::from(2_u32 << octaves) <= f64::from(plan.strips) * COARSEST {
-        octaves += 1;
-    }
+    let octaves = plan.octaves();
     let mut mesh = Mesh {
         positions: Vec::with_capacity(plan.vertices()),
         triangles: Vec::with_capacity(triangles as usize),
@@ -99,9 +150,7 @@ fn sheet(triangles: u32) -> Mesh {
     let mut below = None;
     for i in 0..=plan.strips {
         let row = Row { first: mesh.positions.len() as u32, segments: plan.row(i) };
-        let v = f64::from(i) / f64::from(plan.strips);
-        let point = |j: u32| narrow(place(f64::from(j) / f64::from(row.segments), v, octaves));
-        mesh.positions.extend((0..=row.segments).map(point));
+        mesh.positions.extend(plan.points(i, octaves));
         if let Some(below) = below {
             strip(below, row, false, i, &mut mesh.triangles);
         }
@@ -150,6 +199,22 @@ mod tests {
         (2..400).for_each(check);
         for triangles in [999, 4_096, 65_537, 99_991, 250_000] {
             check(triangles);
+        }
+    }
+
+    /// Told one after the other, they are those of the mesh.
+    #[test]
+    fn streamed_triangles_are_the_same() {
+        for triangles in [2, 3, 100, 10_007] {
+            let model = terrain(triangles);
+            let mesh = &model.meshes[0];
+            let (about, stream) = streamed(triangles);
+            assert_eq!((about.lights, about.cameras, about.materials.len()), (model.lights, model.cameras, 1));
+            let mut expected = (0..).zip(&mesh.triangles).map(|(id, t)| {
+                Object::triangle(id, mesh.material, t.map(|vertex| mesh.positions[vertex as usize]), None)
+            });
+            let told = stream.each(|object| if expected.next() == Some(*object) { Ok(()) } else { Err(*object) });
+            assert_eq!((told, expected.next()), (Ok(()), None), "{triangles}");
         }
     }
 

@@ -1,10 +1,12 @@
 //! Arguments.
 
 use crate::build::{Rule, Settings};
+use crate::partition::Voxels;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
 use hybray_scene::PAGE_BYTES_MAX;
+use hybray_simulated::{MACHINES, Machine, NODES_MAX};
 use std::path::PathBuf;
 
 /// Ray-trace scenes that do not fit in any one machine, on machines of any size
@@ -19,8 +21,12 @@ pub(super) struct Cli {
 pub(super) enum Verb {
     /// Render a scene to a picture
     Render(RenderArgs),
+    /// Render a scene on a virtual machine, and say how long that machine would take
+    Simulate(SimulateArgs),
     /// Say what a scene holds and what it takes
     Info(InfoArgs),
+    /// Build a scene and keep the result in a .hyb file, which every command takes as a scene
+    Pack(PackArgs),
     /// Answer rays from standard input: `t primitive u v nx ny nz` or `miss`
     Trace(TraceArgs),
     /// Write a scene in another format: .nff, .obj (with .mtl) or .pov
@@ -38,7 +44,7 @@ pub(super) enum Verb {
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
-    /// A file (.obj, .nff, .toml), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
+    /// A file (.obj, .nff, .toml, .hyb), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
     pub scene: String,
 }
 
@@ -56,6 +62,10 @@ pub(super) struct TreeArgs {
     /// Most bytes of a page
     #[arg(long, default_value_t = PAGE_BYTES_MAX as u32, value_parser = clap::value_parser!(u32).range(4096..=65536), help_heading = "Tree")]
     pub page_bytes: u32,
+    /// Cut the scene into voxels: a grid, such as 4x8x1, or so many of equal work, such as 32. The picture does not
+    /// depend on it
+    #[arg(long, value_name = "N|WxHxD", help_heading = "Tree")]
+    pub voxels: Option<Voxels>,
 }
 
 impl TreeArgs {
@@ -66,7 +76,7 @@ impl TreeArgs {
                 Rule::Midpoint(midpoint::Settings { depth_max: self.cell_depth, objects_max: self.cell_objects })
             }
         };
-        Settings { rule, page_bytes: self.page_bytes as usize }
+        Settings { rule, page_bytes: self.page_bytes as usize, voxels: self.voxels.unwrap_or_default() }
     }
 }
 
@@ -163,9 +173,82 @@ pub(super) enum Where {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct SimulateArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// The machine: powerxplorer, cc48, gigabit, infiniband, serial-115200 or threads
+    #[arg(long, value_name = "NAME", value_parser = machine)]
+    pub machine: &'static Machine,
+    /// Numbers of nodes, 1 to 4096 each, such as 1,2,4,8
+    #[arg(long, value_name = "N,..", value_delimiter = ',', required = true, value_parser = clap::value_parser!(u16).range(1..=i64::from(NODES_MAX)))]
+    pub nodes: Vec<u16>,
+    /// How work is scheduled: hybrid, hybrid-1995, data-parallel, demand-driven; several are run one after the other
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', default_value = "hybrid")]
+    pub scheduler: Vec<String>,
+    /// Memory of each node, such as 32MiB: everything that it works in. Without it each node has the whole scene
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory: Option<u64>,
+    /// Columns and rows, pixels
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Samples a pixel, 1 to 65535. One sample goes through the middle of the pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    pub spp: Option<u32>,
+    /// Ray depth, 1 to 64: 1 is what is seen directly and its shadows
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub depth: Option<u32>,
+    /// Which of the scene's cameras
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Seed of every random choice
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Where tiles are given out (POV||Ray, section 2.2)
+    #[arg(long, value_enum, default_value_t = Where::Host)]
+    pub dispatcher: Where,
+    /// T of POV||Ray's rule W / (1 + T (N - 1)), 1 and up. Default: 2.5 to start, then learned
+    #[arg(long, value_name = "T", value_parser = at_least_one)]
+    pub spread: Option<f32>,
+    /// Side in pixels of the least piece that is given out: 8, 16, 32 .. 512. Default: adapted to what tiles cost
+    #[arg(long, value_name = "PIXELS", value_parser = tile)]
+    pub tile: Option<u32>,
+    /// Write all runs in JSON to this file, or to standard output (`-`)
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Write a line for each run to this file (CSV), or to standard output (`-`)
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Write a page with figures to this file, or to standard output (`-`)
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Say nothing but errors and results
+    #[arg(short, long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct InfoArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PackArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Where the pages go. Default: the scene's name, .hyb
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Write a report in JSON to this file, or to standard output (`-`)
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
     #[command(flatten)]
     pub tree: TreeArgs,
 }
@@ -210,6 +293,25 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         )),
         None => Err("give columns and rows, such as 640x480".to_owned()),
     }
+}
+
+fn machine(text: &str) -> Result<&'static Machine, String> {
+    let names = || MACHINES.map(|machine| machine.name).join(", ");
+    Machine::named(text).ok_or_else(|| format!("there is no such machine; there are {}", names()))
+}
+
+/// Bytes, with a unit: 32MiB, 512KiB, 1GiB, or a plain number.
+fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let factor: u64 = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1,
+        "k" | "kb" | "kib" => 1 << 10,
+        "m" | "mb" | "mib" => 1 << 20,
+        "g" | "gb" | "gib" => 1 << 30,
+        unit => return Err(format!("`{unit}` is no unit of memory: give bytes, such as 32MiB, 512KiB or 1GiB")),
+    };
+    let number = digits.parse::<u64>().ok().and_then(|n| n.checked_mul(factor)).filter(|&bytes| bytes > 0);
+    number.ok_or_else(|| "give bytes, such as 32MiB, 512KiB or 1GiB".to_owned())
 }
 
 fn number(text: &str, what: &str, holds: impl Fn(f32) -> bool) -> Result<f32, String> {

@@ -2,16 +2,13 @@
 
 use super::args::InfoArgs;
 use super::report::peak_bytes;
-use super::{End, load};
-use crate::prepare::Prepared;
-use crate::{builtin, framing};
+use super::{End, prepare};
+use crate::builtin;
 use anyhow::Result;
 use std::io::Write;
 
 pub(super) fn run(args: &InfoArgs) -> Result<End> {
-    let (model, import_time) = load(&args.scene, None)?;
-    let bounds = framing::bounds(&model);
-    let prepared = Prepared::new(model, &args.tree.settings())?;
+    let (prepared, import_time) = prepare(&args.scene, &args.tree.settings())?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     let nodes = scene.resident.pages.iter().map(|p| p.nodes.len()).sum::<usize>();
@@ -34,9 +31,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
     writeln!(out, "tables       {lights} lights, {materials} materials")?;
     let cameras: Vec<_> = prepared.cameras.iter().map(|c| format!("`{}`", c.name)).collect();
     writeln!(out, "cameras      {}", cameras.join(", "))?;
-    if let Some((lo, hi)) = bounds {
-        writeln!(out, "extent       {lo:?} to {hi:?}")?;
-    }
+    let [lo, hi] = prepared.extent;
+    writeln!(out, "extent       {lo:?} to {hi:?}")?;
     writeln!(out, "requires     {}", prepared.requires().join(", "))?;
     let bytes = prepared.packed.page_bytes();
     writeln!(
@@ -45,6 +41,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
         prepared.packed.pages(),
         bytes as f64 / primitives as f64
     )?;
+    writeln!(out, "voxels       {}", prepared.packed.voxels())?;
     writeln!(
         out,
         "every node   {} bytes of directory, {} bytes of tables",

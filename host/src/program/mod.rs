@@ -6,20 +6,25 @@
 mod args;
 mod convert;
 mod info;
+mod pack;
 mod render;
 mod report;
 mod show;
+mod simulate;
 mod trace;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use args::{Cli, SceneArgs, Verb};
 use clap::{CommandFactory, Parser};
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use crate::model::{CameraSpec, Model};
-use crate::{framing, import};
+use crate::pack::is_packed;
+use crate::prepare::Prepared;
+use crate::{build, framing, import};
 
 /// How a command ended well.
 enum End {
@@ -33,7 +38,9 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let end = match cli.verb {
         Verb::Render(args) => render::run(&args),
+        Verb::Simulate(args) => simulate::run(&args),
         Verb::Info(args) => info::run(&args),
+        Verb::Pack(args) => pack::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Convert(args) => convert::run(&args),
         Verb::Scenes => info::list_builtin(),
@@ -100,12 +107,29 @@ fn man() -> Result<End> {
 /// Reads a scene, and gives it a camera and lights if it has none.
 fn load(args: &SceneArgs, size: Option<[u32; 2]>) -> Result<(Model, Duration)> {
     let start = Instant::now();
+    if is_packed(&args.scene) {
+        bail!("{}: a packed scene keeps pages, not objects; name the scene that it was packed from", args.scene);
+    }
     let mut model = import::load(&args.scene)?;
     if size.is_some() {
         model.settings.size = size;
     }
     framing::complete_with_up(&mut model, import::up_axis(&args.scene));
     Ok((model, start.elapsed()))
+}
+
+/// Reads a scene and builds it with `settings`, or opens it if it is packed; and how long the reading took.
+fn prepare(args: &SceneArgs, settings: &build::Settings) -> Result<(Prepared, Duration)> {
+    if !is_packed(&args.scene) {
+        let (model, import_time) = load(args, None)?;
+        return Ok((Prepared::new(model, settings)?, import_time));
+    }
+    let start = Instant::now();
+    let mut prepared = Prepared::open(Path::new(&args.scene))?;
+    if *settings != build::Settings::default() {
+        prepared.warnings.push(format!("{} is packed already: settings of the tree are not used", args.scene));
+    }
+    Ok((prepared, start.elapsed()))
 }
 
 /// The camera called `name`, or the first.

@@ -3,8 +3,9 @@
 use super::args::{RenderArgs, Where};
 use super::report::{Counts, Memory, Node, Rays, Report, ReportFile, Seconds, peak_bytes};
 use super::show::{Show, rays_per_second};
-use super::{End, camera, load};
+use super::{End, camera, load, prepare};
 use crate::model::Settings;
+use crate::pack::is_packed;
 use crate::picture::{Format, Output, Picture};
 use crate::prepare::Prepared;
 use anyhow::{Context, Result, anyhow, bail};
@@ -29,14 +30,24 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     }
 
     let mut show = Show::new(args.quiet);
-    let (model, import_time) = load(&args.scene, args.size)?;
-    model.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
-    let camera = camera(&model.cameras, args.camera.as_deref())?.clone();
-    show.line(&format!("{}: {} primitives", args.scene.scene, model.primitives()));
-    if interrupted.load(Ordering::Relaxed) {
-        return stopped_early(&show);
-    }
-    let mut prepared = Prepared::new(model, &args.tree.settings())?;
+    let say = |warnings: &[String], primitives: u64| {
+        warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
+        show.line(&format!("{}: {primitives} primitives", args.scene.scene));
+    };
+    let (mut prepared, import_time) = if is_packed(&args.scene.scene) {
+        let opened = prepare(&args.scene, &args.tree.settings())?;
+        say(&opened.0.warnings, opened.0.primitives.iter().sum());
+        opened
+    } else {
+        let (model, import_time) = load(&args.scene, args.size)?;
+        say(&model.warnings, model.primitives() as u64);
+        camera(&model.cameras, args.camera.as_deref())?;
+        if interrupted.load(Ordering::Relaxed) {
+            return stopped_early(&show);
+        }
+        (Prepared::new(model, &args.tree.settings())?, import_time)
+    };
+    let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
     if interrupted.load(Ordering::Relaxed) {
         return stopped_early(&show);
     }
@@ -117,7 +128,7 @@ fn default_output(scene: &str) -> PathBuf {
 }
 
 /// True from the first Ctrl-C on; a second one ends the program at once.
-fn interrupts() -> Result<Arc<AtomicBool>> {
+pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || {
@@ -131,7 +142,7 @@ fn interrupts() -> Result<Arc<AtomicBool>> {
 
 /// Nodes pass over a picture whose camera is none, so it is not sent to them: coordinates that are scaled with a tiny scene
 /// may leave the range of `f32`.
-fn check_camera(frame: &Frame) -> Result<()> {
+pub(super) fn check_camera(frame: &Frame) -> Result<()> {
     let [eye, target, up] = [frame.eye, frame.target, frame.up].map(Into::into);
     Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height)
         .map_err(|error| anyhow!("{error}, in the scene's own unit: bring it nearer, or make the scene larger"))?;

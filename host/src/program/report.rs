@@ -110,8 +110,12 @@ impl ReportFile {
     }
 
     /// Writes the report, whole or not at all.
-    pub fn write(self, report: &Report) -> Result<()> {
-        let text = format!("{}\n", serde_json::to_string_pretty(report)?);
+    pub fn write(self, report: &impl Serialize) -> Result<()> {
+        self.write_text(&format!("{}\n", serde_json::to_string_pretty(report)?))
+    }
+
+    /// Writes a report of any other form, whole or not at all.
+    pub fn write_text(self, text: &str) -> Result<()> {
         let write = || -> std::io::Result<()> {
             match self.pending {
                 Some(mut pending) => {

@@ -1,8 +1,7 @@
 //! `hybray trace`: answers rays, as Radiance's `rtrace` does, through the pages and kernels that pictures are made with.
 
 use super::args::TraceArgs;
-use super::{End, load};
-use crate::prepare::Prepared;
+use super::{End, prepare};
 use anyhow::{Context, Result, bail};
 use hybray_bintree::walk::{Counts, Stack, nearest};
 use hybray_geometry::{Candidate, Ray, Vec3};
@@ -58,8 +57,7 @@ impl Tracer<'_> {
 }
 
 pub(super) fn run(args: &TraceArgs) -> Result<End> {
-    let (model, _) = load(&args.scene, None)?;
-    let prepared = Prepared::new(model, &args.tree.settings())?;
+    let (prepared, _) = prepare(&args.scene, &args.tree.settings())?;
     let pages = prepared.packed.open()?;
     let mut tracer = Tracer {
         scene: prepared.scene(&pages),

@@ -3,6 +3,7 @@
 mod convert;
 mod ends;
 mod errors;
+mod pack;
 mod pictures;
 mod report;
 mod talk;

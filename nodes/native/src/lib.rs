@@ -1,15 +1,20 @@
 //! Nodes as threads of this process: POV||Ray's process farm over the in-memory link.
 #![forbid(unsafe_code)]
 
+use hybray_arena::{Arena, LINE_BYTES};
 use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Peer};
-use hybray_memory::links;
+use hybray_memory::{MemoryLink, links};
 use hybray_runner::{run_master, run_node};
+use hybray_scene::{Line, lines_for};
+use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
-    Dispatcher, Film, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Progress, TileState, can_draw,
+    All, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Plan,
+    PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
+use std::mem::MaybeUninit;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -36,6 +41,19 @@ pub struct Farm {
     pub options: Options,
 }
 
+/// A node's memory, and where pages are to begin with.
+#[derive(Clone, Copy)]
+pub struct Budget<'a> {
+    /// What each node has, bytes: everything that it works in.
+    pub memory: u64,
+    /// The node that owns each page.
+    pub owners: &'a [u16],
+    /// The bytes of each page.
+    pub pages: &'a [&'a [u8]],
+    /// How nodes work.
+    pub settings: Settings,
+}
+
 /// Nodes of one process at most: links between all pairs are counted one by one.
 pub const NODES_MAX: Peer = 1024;
 
@@ -55,6 +73,8 @@ pub struct Traced {
     pub nodes: Vec<NodeReport>,
     /// Nodes, blocks and pages of all walks.
     pub walks: hybray_bintree::walk::Counts,
+    /// What each node did besides its report.
+    pub worked: Vec<Worked>,
     /// Frames that made no sense.
     pub refused_frames: u64,
 }
@@ -71,14 +91,118 @@ pub fn trace(
     farm: &Farm,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Option<Traced> {
+    let limits = Limits::all_at_hand();
+    let bytes = NodeMemory::sum(&limits).total_bytes();
+    run(frame, scene_hash, farm, watch, &|peer, link, dispatcher, clock| {
+        let mut memory = room(bytes);
+        let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
+        let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
+        let node = Node::new(*scene, store, scene_hash, farm.kernels, peer, at, Settings::default(), memory);
+        turn(node, link, dispatcher, clock)
+    })
+}
+
+/// Traces `frame` on `farm.nodes` threads with `budget` each: every node works in one piece of memory of that size, copies
+/// of its pages included, and what it does not have it must ask others for, as over a network.
+///
+/// # Errors
+/// If the budget is too small: what would do. Otherwise as [`trace`].
+///
+/// # Panics
+/// If a node's thread panics: that is a bug.
+pub fn trace_within(
+    scene: &Scene<'_>,
+    scene_hash: u64,
+    frame: &Frame,
+    farm: &Farm,
+    budget: &Budget<'_>,
+    watch: &mut dyn FnMut(Progress) -> bool,
+) -> Result<Option<Traced>, PlanError> {
+    let mut entries = scene.resident.directory.entries.to_vec();
+    for (entry, &owner) in entries.iter_mut().zip(budget.owners) {
+        entry.owner = owner;
+    }
+    let mut scene = *scene;
+    scene.resident.directory.entries = &entries;
+    let plan = plan(&scene, farm.nodes, budget.memory, budget.settings.policy)?;
+    let bytes = plan.sum().total_bytes();
+    Ok(run(frame, scene_hash, farm, watch, &|peer, link, dispatcher, clock| {
+        let mut memory = room(bytes);
+        let (memory, mut cache, scene) =
+            plan.carve(&mut Arena::new(&mut memory), &scene).expect("the sum of its terms");
+        for (page, bytes) in (0..).zip(budget.pages) {
+            if plan.holds_all || scene.resident.directory.entries[page as usize].owner == peer {
+                assert!(cache.put(page, bytes), "page {page} is none");
+            }
+        }
+        let settings = plan.settings(budget.settings);
+        let node = Node::new(scene, cache, scene_hash, farm.kernels, peer, dispatcher_at(farm), settings, memory);
+        turn(node, link, dispatcher, clock)
+    }))
+}
+
+/// The plan for nodes that have `memory` bytes each, and own the pages that the directory says.
+///
+/// # Errors
+/// If that is too little: what would do.
+pub fn plan(scene: &Scene<'_>, nodes: Peer, memory: u64, policy: Policy) -> Result<Plan, PlanError> {
+    let mut owned = vec![0; usize::from(nodes) + 1];
+    for entry in scene.resident.directory.entries {
+        if let Some(owned) = owned.get_mut(usize::from(entry.owner)) {
+            *owned += (lines_for(entry.bytes as usize) * size_of::<Line>()) as u64;
+        }
+    }
+    Plan::new(Sizes::of(scene), nodes, memory, owned.into_iter().max(), policy)
+}
+
+/// Memory for an arena of `bytes`.
+fn room(bytes: u64) -> Box<[MaybeUninit<u8>]> {
+    Box::new_uninit_slice(bytes as usize + LINE_BYTES - 1)
+}
+
+fn dispatcher_at(farm: &Farm) -> Peer {
+    match farm.dispatcher {
+        DispatcherAt::Host => HOST,
+        DispatcherAt::Node => 1,
+    }
+}
+
+type Clock = dyn Fn() -> u64 + Sync;
+
+fn turn<P: Store>(
+    mut node: Node<'_, '_, P>,
+    link: &mut MemoryLink,
+    dispatcher: Option<Dispatcher<'_>>,
+    clock: &Clock,
+) -> Worked {
+    run_node(&mut node, dispatcher, link, &mut || clock());
+    Worked { walks: node.walk_counts(), traffic: node.traffic(), high_water: node.high_water() }
+}
+
+/// What a node tells at its end, besides its report.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Worked {
+    /// Nodes, blocks and pages of its walks.
+    pub walks: hybray_bintree::walk::Counts,
+    /// Rays and pages that went to and fro.
+    pub traffic: Traffic,
+    /// Most that was ever in use.
+    pub high_water: HighWater,
+}
+
+/// Runs the machines: `node` makes and turns each node, on a thread of its own.
+fn run(
+    frame: &Frame,
+    scene_hash: u64,
+    farm: &Farm,
+    watch: &mut dyn FnMut(Progress) -> bool,
+    node: &(dyn Fn(Peer, &mut MemoryLink, Option<Dispatcher<'_>>, &Clock) -> Worked + Sync),
+) -> Option<Traced> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
     let nodes = farm.nodes.clamp(1, NODES_MAX);
     let peers = usize::from(nodes) + 1;
-    let dispatcher_at = match farm.dispatcher {
-        DispatcherAt::Host => HOST,
-        DispatcherAt::Node => 1,
-    };
-    let walks = Mutex::new(hybray_bintree::walk::Counts::default());
+    let dispatcher_at = dispatcher_at(farm);
+    let worked = Mutex::new(vec![Worked::default(); usize::from(nodes)]);
 
     let mut sums = vec![[0; 3]; map.width() as usize * map.height() as usize];
     let mut tiles = vec![TileState::default(); map.len() as usize];
@@ -87,22 +211,18 @@ pub fn trace(
     let mut master = Master::new(*frame, film, &mut reports, scene_hash, dispatcher_at);
 
     let start = Instant::now();
-    let clock = || u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+    let clock = move || u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
     let mut ends = links(nodes + 1).into_iter();
     let mut host_link = ends.next()?;
     let (outcome, time) = std::thread::scope(|threads| {
         for (peer, mut link) in (1..).zip(ends) {
-            let walks = &walks;
+            let (worked, clock) = (&worked, &clock);
             threads.spawn(move || {
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
                 let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options));
-                let mut memory = Box::<NodeMemory>::default();
-                let mut node = Node::new(*scene, scene_hash, farm.kernels, dispatcher_at, &mut memory);
-                run_node(&mut node, dispatcher, &mut link, &mut { clock });
-                let counts = node.walk_counts();
-                let mut all = walks.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                *all += counts;
+                let did = node(peer, &mut link, dispatcher, clock);
+                worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });
         }
         let mut states = vec![NodeState::default(); peers];
@@ -112,6 +232,9 @@ pub fn trace(
         (outcome, start.elapsed())
     });
     let film = master.film();
+    let worked = worked.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut walks = hybray_bintree::walk::Counts::default();
+    worked.iter().for_each(|node| walks += node.walks);
     Some(Traced {
         outcome,
         time,
@@ -119,7 +242,8 @@ pub fn trace(
         film: film.hash(),
         progress: master.progress(),
         nodes: master.reports()[1..].to_vec(),
-        walks: walks.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner),
+        walks,
+        worked,
         refused_frames: master.refused_frames(),
     })
 }

@@ -6,7 +6,7 @@
 #![forbid(unsafe_code)]
 
 use hybray_link::{Event, Link};
-use hybray_scheduler::{Dispatcher, Master, Node, Outcome, Progress};
+use hybray_scheduler::{Dispatcher, Master, Node, Outcome, Progress, Store};
 use hybray_wire::{View, decode};
 
 /// How long a participant that has nothing to do waits for something to arrive, nanoseconds.
@@ -40,8 +40,8 @@ enum Arrival<'a> {
 }
 
 /// Runs a node, and a dispatcher beside it if it has one, until it is told to stop or the host is lost.
-pub fn run_node(
-    node: &mut Node<'_, '_>,
+pub fn run_node<P: Store>(
+    node: &mut Node<'_, '_, P>,
     mut dispatcher: Option<Dispatcher<'_>>,
     link: &mut dyn Link,
     clock: &mut dyn FnMut() -> u64,
@@ -54,13 +54,14 @@ pub fn run_node(
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.handle(from, &view.message, now);
                 }
-                node.handle(from, &view.message);
+                node.handle(from, &view);
             }
             Arrival::Lost { peer } => {
                 host_lost |= peer == hybray_link::HOST;
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.lost(peer);
                 }
+                node.lost(peer);
             }
             Arrival::Nonsense => {}
         });
@@ -68,7 +69,7 @@ pub fn run_node(
             return;
         }
         busy |= node.step(clock);
-        busy |= node.poll(link);
+        busy |= node.poll(link, clock());
         if let Some(dispatcher) = &mut dispatcher {
             dispatcher.poll(link, clock());
         }

@@ -12,7 +12,7 @@ use crate::workspace::Member;
 type Rank = (u8, u8);
 
 /// Every crate's rank, by its folder. A new crate gets its line here.
-const RANKS: [(&str, Rank); 16] = [
+const RANKS: [(&str, Rank); 18] = [
     ("core/arena", (0, 0)),
     ("core/geometry", (0, 0)),
     ("core/scene", (1, 0)),
@@ -24,8 +24,10 @@ const RANKS: [(&str, Rank); 16] = [
     ("core/tracer", (4, 0)),
     ("core/scheduler", (5, 0)),
     ("transport/memory", (6, 0)),
+    ("transport/sim", (6, 0)),
     ("nodes/runner", (7, 0)),
     ("nodes/native", (7, 1)),
+    ("nodes/simulated", (7, 1)),
     ("host", (8, 0)),
     ("tests", (8, 1)),
     ("xtask", (8, 1)),

@@ -12,11 +12,13 @@ struct Wire {
     sent: Vec<(Peer, u32, u32, u16)>,
     told: Vec<Peer>,
     room: usize,
+    /// Who was told to share, and with whom.
+    shared: Vec<(Peer, Peer)>,
 }
 
 impl Wire {
     fn new() -> Self {
-        Self { sent: Vec::new(), told: Vec::new(), room: usize::MAX }
+        Self { sent: Vec::new(), told: Vec::new(), room: usize::MAX, shared: Vec::new() }
     }
 
     fn take(&mut self) -> Vec<(Peer, u32, u32, u16)> {
@@ -41,6 +43,11 @@ impl Link for Wire {
         match decode(&bytes[..used]).unwrap().message {
             Message::Tiles { first, count, epoch } => self.sent.push((to, first, count, epoch)),
             Message::Finished { .. } => self.told.push(to),
+            Message::Share { with } => {
+                // Room is counted for runs.
+                self.room += 1;
+                self.shared.push((to, with));
+            }
             other => panic!("a dispatcher does not say {other:?}"),
         }
         true
@@ -323,4 +330,31 @@ fn only_the_host_begins_and_only_the_oldest_run_is_done() {
     d.handle(77, &HELLO, 0);
     d.lost(77);
     assert_eq!(d.nodes[1].runs, before);
+}
+
+/// Node 3 has nothing to do at the end: one of those who have is told to share, and not again before it is through.
+#[test]
+fn who_has_nothing_is_shared_with_once_at_a_time() {
+    let mut nodes = vec![NodeState::default(); 4];
+    let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
+    let mut wire = Wire::new();
+    dispatcher.handle(HOST, &begin(8), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.poll(&mut wire, 0);
+    let with_runs: Vec<Peer> = wire.sent.iter().map(|run| run.0).collect();
+    assert_eq!(with_runs, [1, 2]);
+    assert_eq!(wire.shared, [(1, 3)]);
+    dispatcher.poll(&mut wire, 1);
+    assert_eq!(wire.shared.len(), 1);
+    dispatcher.handle(3, &Message::Idle, 2);
+    dispatcher.poll(&mut wire, 2);
+    assert_eq!(wire.shared[1..], [(2, 3)]);
+    // When nobody has a run there is nothing to share.
+    dispatcher.handle(3, &Message::Idle, 3);
+    for (peer, first, count, _) in wire.sent.clone() {
+        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
+    }
+    dispatcher.poll(&mut wire, 4);
+    assert_eq!(wire.shared.len(), 2);
+    assert_eq!(wire.told, [1, 2, 3]);
 }

@@ -70,15 +70,14 @@ impl Picture {
                     primitive: Candidate::NOTHING,
                     weight: [1.0; 3],
                     depth: 1,
-                    pixel,
+                    page: RayRecord::FROM_ROOT,
                     ..bytemuck::Zeroable::zeroed()
                 };
                 counts.primary += 1;
-                let hit = walker.nearest(&scene, &ray);
                 let mut lane = Lane::new(&mut records);
-                lane.start(&scene, &record, &hit, &mut sink, &mut counts);
+                assert_eq!(lane.take(&scene, &mut walker, record, &mut sink, &mut counts), None);
                 while !lane.is_empty() {
-                    lane.step(&scene, &mut walker, &mut sink, &mut counts);
+                    assert_eq!(lane.step(&scene, &mut walker, &mut sink, &mut counts), None);
                 }
             }
             sums.push(sink.sum);

@@ -3,10 +3,12 @@
 use crate::common::Rng;
 use crate::net::{End, Lie, Manner, Net};
 use crate::toy::SCENE_HASH;
+use hybray_arena::{Arena, LINE_BYTES};
 use hybray_geometry::simd::Kernels;
 use hybray_link::{Event, HOST, Link, Peer};
 use hybray_scheduler::{
-    Dispatcher, Film, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, TileState,
+    All, Dispatcher, Film, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Settings,
+    TileState,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, Message, TileMap, decode};
@@ -16,6 +18,8 @@ use std::collections::VecDeque;
 const WAIT: u64 = 20_000_000;
 /// What a turn takes besides tracing.
 const TURN: u64 = 1_000;
+/// Tiles that a node keeps at a time.
+const TILES: u32 = 4;
 /// How long a node with a dispatcher beside it traces before it looks up: a node's step is bounded.
 const STEP: u64 = 500_000;
 
@@ -68,16 +72,22 @@ pub struct Report {
 /// A node, and what the world knows of it from its messages.
 struct Worker<'m, 's> {
     me: Peer,
-    node: Node<'m, 's>,
+    node: Node<'m, 's, All<'s>>,
     dispatcher: Option<Dispatcher<'m>>,
     /// First and count of the runs that it has been given and not yet traced; the oldest first.
     runs: VecDeque<(u32, u32)>,
     /// Runs whose `Done` has not been sent.
     held: usize,
-    /// Tiles of the bundle in work that have not been sent.
-    in_work: u32,
+    /// What each of these runs, and of those that are done and not told, has cost.
+    spent: VecDeque<u64>,
+    /// Samples of the bundle in work that are still to be traced.
+    samples_left: u16,
+    /// Tiles that were begun and have not been sent.
+    unsent: u32,
     idle_since: Option<u64>,
     gone: bool,
+    /// It was told to end: it takes no more runs.
+    stopped: bool,
     /// It is tracing until it wakes, and so much longer; then it sends.
     tracing: bool,
     left: u64,
@@ -90,7 +100,21 @@ impl Worker<'_, '_> {
         let mut busy = false;
         let mut host_lost = false;
         for _ in 0..plan.frames_a_turn {
-            let Self { me, node, dispatcher, runs, held, in_work, left, idle_since, gaps, .. } = self;
+            let Self {
+                me,
+                node,
+                dispatcher,
+                runs,
+                held,
+                spent,
+                samples_left,
+                unsent,
+                stopped,
+                left,
+                idle_since,
+                gaps,
+                ..
+            } = self;
             let more = net.end(*me, now).receive(&mut |event| match event {
                 Event::Frame { from, bytes } => {
                     let Ok(view) = decode(bytes) else { return };
@@ -98,26 +122,31 @@ impl Worker<'_, '_> {
                         dispatcher.handle(from, &view.message, now);
                     }
                     if let Message::Tiles { first, count, .. } = view.message
+                        && !*stopped
                         && count > 0
                         && first.checked_add(count).is_some_and(|end| end <= map.len())
                     {
                         runs.push_back((first, count));
+                        spent.push_back(0);
                         *held += 1;
                         *gaps += idle_since.take().map_or(0, |since| now - since);
                         assert!(*held <= 2, "node {me} has {held} runs");
                     }
                     if view.message == Message::Stop {
                         // It drops what it has, and only says what it did.
+                        *stopped = true;
                         runs.clear();
-                        (*in_work, *left) = (0, 0);
+                        spent.clear();
+                        (*samples_left, *unsent, *left) = (0, 0, 0);
                     }
-                    node.handle(from, &view.message);
+                    node.handle(from, &view);
                 }
                 Event::Lost { peer } => {
                     host_lost |= peer == HOST;
                     if let Some(dispatcher) = dispatcher {
                         dispatcher.lost(peer);
                     }
+                    node.lost(peer);
                 }
             });
             if !more {
@@ -145,20 +174,29 @@ impl Worker<'_, '_> {
             return self.trace(self.left, now);
         }
         let mut cost = 0;
-        let starts = self.in_work == 0 && !self.runs.is_empty();
-        if starts && let Some(run) = self.runs.front_mut() {
-            self.in_work = map.square(run.0, run.1);
-            let tiles = run.0 as usize..(run.0 + self.in_work) as usize;
+        if self.samples_left == 0
+            && let Some(run) = self.runs.front_mut()
+            && self.unsent + map.square(run.0, run.1) <= TILES
+        {
+            let count = map.square(run.0, run.1);
+            let tiles = run.0 as usize..(run.0 + count) as usize;
             cost = plan.costs[tiles].iter().sum::<u64>() * plan.speeds[usize::from(self.me) - 1];
-            *run = (run.0 + self.in_work, run.1 - self.in_work);
+            *run = (run.0 + count, run.1 - count);
+            self.unsent += count;
+            // The runs that are not yet traced come after those that are done.
+            let at = self.spent.len() - self.runs.len();
+            self.spent[at] += cost;
+            self.samples_left = plan.frame.samples;
         }
         let mut calls = 0;
         let worked = self.node.step(&mut || {
             calls += 1;
             if calls == 1 { now } else { now + cost }
         });
-        assert!(worked || !starts, "node {} does not begin its run", self.me);
+        // A sample of a bundle in each step, and nothing else to do.
+        assert_eq!(worked, self.samples_left > 0, "node {}: {} tiles not sent", self.me, self.unsent);
         if worked {
+            self.samples_left -= 1;
             return self.trace(cost, now);
         }
         self.send(net, now, busy)
@@ -175,22 +213,23 @@ impl Worker<'_, '_> {
     fn send(&mut self, net: &mut Net<'_>, now: u64, mut busy: bool) -> u64 {
         busy |= self.tracing;
         self.tracing = false;
-        busy |= self.node.poll(&mut net.end(self.me, now));
+        if self.samples_left == 0 && self.runs.front().is_some_and(|run| run.1 == 0) {
+            self.runs.pop_front();
+            if self.runs.is_empty() {
+                self.idle_since = Some(now);
+            }
+        }
+        busy |= self.node.poll(&mut net.end(self.me, now), now);
         if let Some(dispatcher) = &mut self.dispatcher {
             dispatcher.poll(&mut net.end(self.me, now), now);
         }
         for message in std::mem::take(&mut net.sent[usize::from(self.me)]) {
             match message {
-                Message::Contributions { .. } => {
-                    self.in_work -= 1;
-                    if self.in_work == 0 && self.runs.front().is_some_and(|run| run.1 == 0) {
-                        self.runs.pop_front();
-                        if self.runs.is_empty() {
-                            self.idle_since = Some(now);
-                        }
-                    }
+                Message::Contributions { .. } => self.unsent -= 1,
+                Message::Done { nanoseconds, .. } => {
+                    self.held -= 1;
+                    assert_eq!(Some(nanoseconds), self.spent.pop_front(), "node {}'s time for a run", self.me);
                 }
-                Message::Done { .. } => self.held -= 1,
                 _ => {}
             }
         }
@@ -266,20 +305,30 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
         HOST => (Some(Dispatcher::new(&mut states, plan.options)), None),
         _ => (None, Some(Dispatcher::new(&mut states, plan.options))),
     };
-    let mut memories: Vec<NodeMemory> = (1..peers).map(|_| NodeMemory::new()).collect();
+    let limits = Limits::all_at_hand();
+    let bytes = NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1;
+    let mut memories: Vec<_> = (1..peers).map(|_| Box::<[u8]>::new_uninit_slice(bytes)).collect();
     let mut workers: Vec<Worker<'_, '_>> = (1..)
         .zip(&mut memories)
         .map(|(me, memory)| {
             let hash = SCENE_HASH + u64::from(plan.stranger == Some(me));
+            let memory = NodeMemory::carve(&mut Arena::new(memory), &limits).expect("the sum of its terms");
+            let store = All(plan.scene.resident.pages);
+            // A step traces a sample of a bundle to its end, so that the world knows what it costs.
+            let settings = Settings { steps: u32::MAX, ..Settings::default() };
+            let kernels = Kernels::Portable;
             Worker {
                 me,
-                node: Node::new(plan.scene, hash, Kernels::Portable, plan.dispatcher, memory),
+                node: Node::new(plan.scene, store, hash, kernels, me, plan.dispatcher, settings, memory),
                 dispatcher: if me == plan.dispatcher { node_dispatcher.take() } else { None },
                 runs: VecDeque::new(),
                 held: 0,
-                in_work: 0,
+                spent: VecDeque::new(),
+                samples_left: 0,
+                unsent: 0,
                 idle_since: None,
                 gone: false,
+                stopped: false,
                 tracing: false,
                 left: 0,
                 gaps: 0,
@@ -304,7 +353,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
         let turn = (0..peers).min_by_key(|&peer| wakes[peer]).unwrap_or(0);
         let now = wakes[turn];
         if now > bound {
-            let state = workers.iter().map(|w| format!("{}: {:?} in work {}", w.me, w.runs, w.in_work));
+            let state = workers.iter().map(|w| format!("{}: {:?}, {} tiles not sent", w.me, w.runs, w.unsent));
             let state: Vec<_> = state.collect();
             return Err(format!("stuck at {:?} with {:?}; {}", master.progress(), master.outcome(), state.join("; ")));
         }

@@ -1,0 +1,315 @@
+//! What travels between nodes: rays, pages, partial sums, and the sums of finished tiles.
+
+use super::tiles::{OpenTile, Stage as TileStage, TILE_PIXELS, place_of};
+use super::{Node, Store};
+use crate::send;
+use crate::node::store::Landed;
+use bytemuck::{bytes_of, pod_read_unaligned};
+use hybray_arena::List;
+use hybray_geometry::Candidate;
+use hybray_link::{HOST, Link, Peer};
+use hybray_wire::{
+    BODY_BYTES_MAX, HEAD_BYTES_MAX, Message, Partial, RayKind, RayRecord, ShadowRecord, TileMap, View, encode,
+};
+
+/// Bytes of a page in one frame.
+const PART_BYTES: usize = 4096;
+/// Partial sums in one frame.
+const PARTIALS_MAX: usize = BODY_BYTES_MAX / size_of::<Partial>();
+/// Rays in one frame at most, whatever the settings say.
+const RAYS_MAX: usize = BODY_BYTES_MAX / size_of::<RayRecord>();
+
+impl<P: Store> Node<'_, '_, P> {
+    /// Rays, what became of rays, and partial sums.
+    pub(super) fn handle_rays(&mut self, from: Peer, view: &View<'_>) {
+        match view.message {
+            Message::Rays { rays, shadows, load } => {
+                if let Some(peer) = self.memory.peers.get(from) {
+                    peer.load = load;
+                }
+                self.handle_records(from, rays, shadows, view.body);
+            }
+            Message::Took { taken, load } => {
+                let Some(peer) = self.memory.peers.get(from) else { return };
+                (peer.load, peer.full) = (load, !taken);
+                let mut flight = core::mem::take(&mut peer.flight);
+                let count = flight.len() as u64;
+                if taken {
+                    self.traffic.forwarded += count;
+                    while self.memory.pool.pop(&mut flight).is_some() {}
+                    return;
+                }
+                self.traffic.refused += count;
+                while let Some(ray) = self.memory.pool.pop(&mut flight) {
+                    let here = self.store.page(ray.page).is_some();
+                    // Its place was free this moment.
+                    let _ = self.memory.pool.push(ray, here);
+                }
+            }
+            _ => {
+                for bytes in view.body.chunks_exact(size_of::<Partial>()) {
+                    let partial: Partial = pod_read_unaligned(bytes);
+                    if let Some(place) = place_of(self.memory.tiles, 0, partial.tile, partial.epoch) {
+                        self.memory.tiles[place].take(&partial);
+                    }
+                }
+            }
+        }
+    }
+
+    fn handle_records(&mut self, from: Peer, rays: u16, shadows: u16, body: &[u8]) {
+        let (rays, shadows) = (usize::from(rays), usize::from(shadows));
+        if rays + shadows == 0 {
+            self.helped = true;
+            return;
+        }
+        // Some room is kept for the rays of one's own tiles: else they would only ever go where the pool is.
+        let kept = self.memory.pool.capacity() / 8;
+        let taken = self.picture.is_some() && self.memory.pool.free() >= rays + shadows + kept;
+        self.memory.peers.answer(from, taken);
+        if !taken {
+            return;
+        }
+        let (nearest, any) = body.split_at(rays * size_of::<RayRecord>());
+        let nearest = nearest.chunks_exact(size_of::<RayRecord>()).map(pod_read_unaligned::<RayRecord>);
+        let any = any.chunks_exact(size_of::<ShadowRecord>()).map(pod_read_unaligned::<ShadowRecord>);
+        for ray in nearest.chain(any.map(|shadow| RayRecord::from(&shadow))) {
+            if !self.makes_sense(&ray) {
+                self.traffic.nonsense += 1;
+                continue;
+            }
+            self.traffic.arrived += 1;
+            self.helped |= ray.settled == 1 && ray.kind == RayKind::Primary as u8;
+            let here = self.store.page(ray.page).is_some();
+            // There is room for all of them.
+            let _ = self.memory.pool.push(ray, here);
+        }
+    }
+
+    /// Whether a ray from elsewhere can be traced without harm.
+    fn makes_sense(&self, ray: &RayRecord) -> bool {
+        let pages = self.scene.resident.directory.entries.len();
+        let map: Option<&TileMap> = self.picture.as_ref().map(|p| &p.map);
+        (ray.page as usize) < pages
+            && (ray.primitive == Candidate::NOTHING || (ray.hit_page as usize) < pages)
+            && ray.settled <= 1
+            && ray.kind <= RayKind::Shadow as u8
+            && (1..=super::DEPTH_MAX as u8).contains(&ray.depth)
+            && map.is_some_and(|map| ray.tile < map.len() && usize::from(ray.pixel) < map.tile(ray.tile).pixels())
+            && ray.home != HOST
+            && usize::from(ray.home) < self.memory.owed.len()
+    }
+
+    /// A part of a page that was asked for.
+    pub(super) fn handle_part(&mut self, from: Peer, page: u32, offset: u32, part: &[u8]) {
+        let Some(at) = self.requests.iter().position(|r| r.page == page && r.from == from && r.sent) else { return };
+        match self.store.land(page, offset as usize, part) {
+            Landed::Part => {}
+            Landed::Whole => {
+                self.requests.swap_remove(at);
+                self.traffic.fetched += 1;
+                self.memory.pool.landed(page);
+            }
+            // It will be wanted again, and its home has it.
+            Landed::Refused => {
+                self.requests.swap_remove(at);
+                self.memory.pool.page(page).asked = false;
+            }
+        }
+    }
+
+    fn load(&self) -> u16 {
+        self.memory.pool.ready_rays().min(usize::from(u16::MAX)) as u16
+    }
+
+    /// Tells those who sent rays whether they were taken.
+    pub(super) fn answer(&mut self, link: &mut dyn Link) -> bool {
+        let mut sent = false;
+        for _ in 0..self.memory.peers.answers() {
+            let Some((peer, taken)) = self.memory.peers.next_answer() else { break };
+            let lost = self.memory.peers.get(peer).is_none_or(|p| p.lost);
+            let told = lost || send(link, peer, &Message::Took { taken, load: self.load() });
+            self.memory.peers.answered(told);
+            sent |= told;
+        }
+        sent
+    }
+
+    /// Sends partial sums to the nodes that keep the tiles: all that a peer is owed, if there is much of it or nothing
+    /// better to do.
+    pub(super) fn pay(&mut self, link: &mut dyn Link) -> bool {
+        let mut sent = false;
+        let (idle, full) = (self.idle, self.memory.partials.free() * 2 < self.memory.partials.capacity());
+        for _ in 0..self.memory.owing.len() {
+            let Some(peer) = self.memory.owing.pop_front() else { break };
+            let m = &mut self.memory;
+            let list = &mut m.owed[usize::from(peer)];
+            let count = list.len().min(PARTIALS_MAX);
+            if !idle && !full && count < usize::from(self.settings.granularity) {
+                let _ = m.owing.push_back(peer);
+                continue;
+            }
+            let mut front = m.partials.split_front(list, count);
+            let message = Message::Partials { count: count as u16 };
+            let went = link.send(peer, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
+                encode(&message, room, |body| {
+                    for (bytes, partial) in body.chunks_exact_mut(size_of::<Partial>()).zip(m.partials.iter(&front)) {
+                        bytes.copy_from_slice(bytes_of(partial));
+                    }
+                })
+                .expect("the room for a message is enough for any")
+            });
+            if went {
+                while m.partials.pop_front(&mut front).is_some() {}
+            } else {
+                m.partials.append(&mut front, list);
+                *list = front;
+            }
+            sent |= went;
+            if !m.owed[usize::from(peer)].is_empty() {
+                let _ = m.owing.push_back(peer);
+            }
+        }
+        sent
+    }
+
+    /// Sends parts of pages to those who asked for them, one each.
+    pub(super) fn serve(&mut self, link: &mut dyn Link) -> bool {
+        let mut sent = false;
+        for _ in 0..self.memory.peers.serves() {
+            let Some((peer, page, offset)) = self.memory.peers.next_serve() else { break };
+            let bytes = self.store.bytes(page).unwrap_or(&[]);
+            let part = bytes.get(offset as usize..).unwrap_or(&[]);
+            let part = &part[..part.len().min(PART_BYTES)];
+            let message = Message::Part { page, offset, bytes: part.len() as u16 };
+            let lost = self.memory.peers.get(peer).is_none_or(|p| p.lost);
+            let went = lost
+                || link.send(peer, HEAD_BYTES_MAX + part.len(), &mut |room| {
+                    encode(&message, room, |body| body.copy_from_slice(part))
+                        .expect("the room for a message is enough for any")
+                });
+            let whole = lost || offset as usize + part.len() >= bytes.len();
+            self.traffic.served += u64::from(went && whole && !part.is_empty());
+            let count = part.len() as u32;
+            self.memory.peers.served(if went { count } else { 0 }, went && whole);
+            sent |= went;
+        }
+        sent
+    }
+
+    /// Asks for pages that have a place.
+    pub(super) fn ask(&mut self, link: &mut dyn Link) -> bool {
+        let mut sent = false;
+        for at in 0..self.requests.len() {
+            let request = self.requests[at];
+            let asked = self.requests.iter().filter(|r| r.sent && r.from == request.from).count();
+            if !request.sent && asked < super::peers::FETCHES {
+                self.requests[at].sent = send(link, request.from, &Message::Fetch { page: request.page });
+                sent |= self.requests[at].sent;
+            }
+        }
+        sent
+    }
+
+    /// Sends rays to the nodes that have their pages. They stay in the pool until they are taken.
+    pub(super) fn forward(&mut self, link: &mut dyn Link, now: u64) -> bool {
+        let mut sent = false;
+        let idle = self.idle;
+        let granularity = usize::from(self.settings.granularity).clamp(1, RAYS_MAX);
+        let compact = !self.scene.transmits;
+        for _ in 0..self.memory.peers.sends() {
+            let Some(peer) = self.memory.peers.next_send() else { break };
+            let load = self.load();
+            let m = &mut self.memory;
+            let Some(state) = m.peers.get(peer) else { continue };
+            if state.lost {
+                continue;
+            }
+            let since = state.since;
+            if state.outbox.is_empty() {
+                // Who asked for a share hears that there is none.
+                let nothing = Message::Rays { rays: 0, shadows: 0, load };
+                if state.flight.is_empty() && !send(link, peer, &nothing) {
+                    m.peers.send_on(peer, since);
+                }
+                continue;
+            }
+            let due = idle || state.outbox.len() >= granularity || now.saturating_sub(since) >= self.settings.deadline_ns;
+            if !due || !state.flight.is_empty() {
+                m.peers.send_on(peer, since);
+                continue;
+            }
+            let mut outbox = core::mem::take(&mut state.outbox);
+            let front: List = m.pool.split_front(&mut outbox, granularity);
+            let is_compact = |ray: &&RayRecord| compact && ray.kind == RayKind::Shadow as u8;
+            let shadows = m.pool.iter(&front).filter(is_compact).count();
+            let message = Message::Rays { rays: (front.len() - shadows) as u16, shadows: shadows as u16, load };
+            let went = link.send(peer, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
+                encode(&message, room, |body| {
+                    let (mut nearest, mut any) =
+                        body.split_at_mut((front.len() - shadows) * size_of::<RayRecord>());
+                    for ray in m.pool.iter(&front) {
+                        if is_compact(&ray) {
+                            let (bytes, rest) = any.split_at_mut(size_of::<ShadowRecord>());
+                            bytes.copy_from_slice(bytes_of(&ShadowRecord::from(ray)));
+                            any = rest;
+                        } else {
+                            let (bytes, rest) = nearest.split_at_mut(size_of::<RayRecord>());
+                            bytes.copy_from_slice(bytes_of(ray));
+                            nearest = rest;
+                        }
+                    }
+                })
+                .expect("the room for a message is enough for any")
+            });
+            let mut flight = List::EMPTY;
+            if went {
+                flight = front;
+            } else {
+                m.pool.put_back(&mut outbox, front);
+            }
+            let more = !outbox.is_empty();
+            if let Some(state) = m.peers.get(peer) {
+                (state.outbox, state.flight) = (outbox, flight);
+            }
+            if more {
+                m.peers.send_on(peer, if went { now } else { since });
+            }
+            sent |= went;
+        }
+        sent
+    }
+
+    /// Sends the sums of finished tiles to the film.
+    pub(super) fn send_tiles(&mut self, link: &mut dyn Link) -> bool {
+        let Some(picture) = &self.picture else { return false };
+        let mut sent = false;
+        for tile in self.memory.tiles.iter_mut().filter(|t| t.stage == TileStage::Finished) {
+            let shape = picture.map.tile(tile.tile);
+            let message = Message::Contributions {
+                tile: tile.tile,
+                epoch: tile.epoch,
+                width: shape.width as u8,
+                height: shape.height as u8,
+                rays: tile.rays,
+                entry: tile.entry,
+            };
+            let sums = &tile.sums[..shape.pixels().min(TILE_PIXELS)];
+            let went = link.send(HOST, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
+                encode(&message, room, |body| {
+                    for (bytes, sum) in body.chunks_exact_mut(8).zip(sums.as_flattened()) {
+                        bytes.copy_from_slice(&sum.to_le_bytes());
+                    }
+                })
+                .expect("the room for a message is enough for any")
+            });
+            if !went {
+                break;
+            }
+            *tile = OpenTile::FREE;
+            self.sent_tiles += 1;
+            sent = true;
+        }
+        sent
+    }
+}

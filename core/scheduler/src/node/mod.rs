@@ -1,0 +1,806 @@
+//! A node: traces runs of tiles, and what other nodes send it.
+//!
+//! It works on a bundle at a time: four tiles that make a square, or one. Primary rays are traced as a bundle; each
+//! hit's rays are finished depth first in a lane, as far as the pages at hand go. A ray that needs another page waits in
+//! the pool, until the page comes here or the ray goes to a node that has it (policy). The node keeps the sums of the
+//! tiles that it was given until the last ray that they caused has ended, wherever that was; then they go to the film.
+//!
+//! Nothing waits for room that may never come (DESIGN section 2, law 3): where the pool is full, the ray that the lane has
+//! in hand stays there, and its page is fetched into a place that is kept for it.
+
+mod frames;
+mod memory;
+mod peers;
+mod picture;
+mod pool;
+mod store;
+mod tiles;
+
+pub use memory::{Limits, NodeMemory};
+pub use picture::can_draw;
+pub use store::{All, Backing, Cache, Charged, Landed, Own, Place as CachePlace, Store};
+
+pub(crate) use peers::{PeerState, Peers};
+
+use crate::policy::{Choice, LinkCost, Policy, Situation, decide};
+use crate::send;
+use hybray_bintree::walk::{FROM_ROOT, Hit};
+use hybray_geometry::simd::Kernels;
+use hybray_geometry::Ray;
+use hybray_link::{HOST, Link, Peer};
+use hybray_pyraclip::wide;
+use hybray_scene::Pages;
+use hybray_shading::{id, sample_offset};
+use hybray_tracer::{Lane, Scene, Walker};
+use hybray_wire::{Counts, Message, RayKind, RayRecord, TILE, View};
+use memory::Bundle;
+use picture::Picture;
+use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
+
+/// Tiles of a bundle.
+const TILES: usize = 4;
+/// Primary rays of a bundle.
+const BUNDLE: usize = TILES * TILE_PIXELS;
+/// Runs that wait.
+const RUNS: usize = 4;
+/// Pages that may be on their way here, the lane's not counted.
+pub const REQUESTS_MAX: usize = 16;
+/// Wanted pages that are looked at in one call.
+const DECISIONS: usize = 32;
+/// Depth of a picture at most.
+pub const DEPTH_MAX: usize = 64;
+
+/// What may be chosen about a node. None of it changes a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Forward or fetch.
+    pub policy: Policy,
+    /// What the policy takes a message to cost.
+    pub link: LinkCost,
+    /// What the policy takes a ray to cost, nanoseconds.
+    pub ray_ns: u32,
+    /// Rays in one message at most (the report's table 6.1).
+    pub granularity: u16,
+    /// How long rays wait for a message to fill, nanoseconds.
+    pub deadline_ns: u64,
+    /// Units of work in one [`Node::step`]: walks, or little more.
+    pub steps: u32,
+    /// Tiles of a bundle, 1 or 4: 8 x 8 or 16 x 16 pixels a pyramid (table 6.1).
+    pub bundle_tiles: u8,
+    /// No new tile is begun while so many rays wait (table 6.1's pixels in the system).
+    pub in_system: u32,
+    /// Pages that may be on their way here, 1 to [`REQUESTS_MAX`].
+    pub requests: u8,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            policy: Policy::Hybrid,
+            link: LinkCost { message_ns: 20_000, byte_ps: 1_000 },
+            ray_ns: 2_000,
+            granularity: 100,
+            deadline_ns: 1_000_000,
+            steps: 4096,
+            bundle_tiles: 4,
+            in_system: 4096,
+            requests: 8,
+        }
+    }
+}
+
+/// What a node did besides tracing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Rays that came from other nodes.
+    pub arrived: u64,
+    /// Rays that were sent to other nodes and taken.
+    pub forwarded: u64,
+    /// Rays that came back, since there was no room for them.
+    pub refused: u64,
+    /// Pages that came here.
+    pub fetched: u64,
+    /// Pages that were sent to others.
+    pub served: u64,
+    /// Records that came from peers and made no sense.
+    pub nonsense: u64,
+}
+
+/// Most that was ever in use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HighWater {
+    /// Rays that waited, of how many.
+    pub rays: (usize, usize),
+    /// Partial sums.
+    pub partials: (usize, usize),
+    /// Tiles.
+    pub tiles: (usize, usize),
+    /// Page requests.
+    pub requests: (usize, usize),
+    /// Bytes of pages held.
+    pub page_bytes: u64,
+}
+
+/// Where a ray of the bundle belongs.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    x: u32,
+    y: u32,
+    /// Tile of the bundle.
+    tile: u8,
+    /// Pixel of the tile.
+    pixel: u8,
+}
+
+#[derive(Clone, Copy)]
+struct Run {
+    first: u32,
+    count: u32,
+    epoch: u16,
+    done: u32,
+    nanoseconds: u64,
+}
+
+/// What of the bundle is in work.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// Nothing: the next bundle may begin.
+    Idle,
+    /// Primary rays of sample `sample` from `next` on are still to be shaded.
+    /// Those before `end`, that is: the others were given away.
+    Shading { sample: u16, next: usize, end: usize },
+}
+
+/// The bundle in work.
+#[derive(Clone, Copy)]
+struct InWork {
+    /// Tiles and their epochs.
+    tiles: [(u32, u16); TILES],
+    count: usize,
+    rays: usize,
+    /// Whether it was begun for the oldest run; else a tile is traced again.
+    of_run: bool,
+}
+
+/// A page that was asked for, or is to be.
+#[derive(Clone, Copy)]
+struct Request {
+    page: u32,
+    from: Peer,
+    sent: bool,
+}
+
+/// The machine.
+pub struct Node<'m, 's, P: Store> {
+    scene: Scene<'s>,
+    store: P,
+    memory: NodeMemory<'m>,
+    settings: Settings,
+    kernels: Kernels,
+    me: Peer,
+    dispatcher: Peer,
+    scene_hash: u64,
+    picture: Option<Picture>,
+    runs: heapless::Deque<Run, RUNS>,
+    in_work: InWork,
+    stage: Stage,
+    /// Records of the lane in use.
+    depth: usize,
+    /// The ray that the lane has in hand and the pool has no room for.
+    aside: Option<RayRecord>,
+    requests: heapless::Vec<Request, { REQUESTS_MAX + 1 }>,
+    /// The wanted page that is looked at next.
+    looked_at: usize,
+    /// Runs that are done and not yet told.
+    done: heapless::Deque<Run, RUNS>,
+    greeted: [bool; 2],
+    report: bool,
+    stopped: bool,
+    counts: Counts,
+    walk_counts: hybray_bintree::walk::Counts,
+    traffic: Traffic,
+    high_water: HighWater,
+    /// The last step found nothing to do: what waits for company goes now.
+    idle: bool,
+    /// Somebody shares with this node: the dispatcher is told when that is done.
+    helped: bool,
+    tiles: u32,
+    /// Tiles whose sums have gone to the film.
+    sent_tiles: u32,
+    runs_given: u32,
+    busy: u64,
+}
+
+impl<'m, 's, P: Store> Node<'m, 's, P> {
+    /// Node `me` of `scene`, with the pages of `store` (those of `scene` are not looked at), that takes its tiles from
+    /// `dispatcher`.
+    pub fn new(
+        scene: Scene<'s>,
+        store: P,
+        scene_hash: u64,
+        kernels: Kernels,
+        me: Peer,
+        dispatcher: Peer,
+        settings: Settings,
+        memory: NodeMemory<'m>,
+    ) -> Self {
+        Self {
+            scene,
+            store,
+            memory,
+            settings,
+            kernels,
+            me,
+            dispatcher,
+            scene_hash,
+            picture: None,
+            runs: heapless::Deque::new(),
+            in_work: InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false },
+            stage: Stage::Idle,
+            depth: 0,
+            aside: None,
+            requests: heapless::Vec::new(),
+            looked_at: 0,
+            done: heapless::Deque::new(),
+            greeted: [false; 2],
+            report: false,
+            stopped: false,
+            counts: Counts::default(),
+            walk_counts: hybray_bintree::walk::Counts::default(),
+            traffic: Traffic::default(),
+            high_water: HighWater::default(),
+            idle: true,
+            helped: false,
+            tiles: 0,
+            sent_tiles: 0,
+            runs_given: 0,
+            busy: 0,
+        }
+    }
+
+    /// Whether it was told to end, and has said what it did.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.stopped && !self.report
+    }
+
+    /// Boxes, blocks and pages of all walks so far.
+    #[must_use]
+    pub fn walk_counts(&self) -> hybray_bintree::walk::Counts {
+        self.walk_counts
+    }
+
+    /// Tiles of its own that are finished.
+    #[must_use]
+    pub fn finished_tiles(&self) -> u32 {
+        self.sent_tiles + self.memory.tiles.iter().filter(|t| t.stage == TileStage::Finished).count() as u32
+    }
+
+    /// Rays and contributions so far.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// What it did besides tracing.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    /// Most that was ever in use.
+    #[must_use]
+    pub fn high_water(&self) -> HighWater {
+        let m = &self.memory;
+        HighWater {
+            rays: (m.pool.high_water(), m.pool.capacity()),
+            partials: (m.partials.high_water(), m.partials.capacity()),
+            ..self.high_water
+        }
+    }
+
+    /// Takes in a message; those for other machines, and those from peers that have no right to them, are passed over.
+    /// A node draws one picture.
+    pub fn handle(&mut self, from: Peer, view: &View<'_>) {
+        match view.message {
+            Message::Begin(frame) if from == HOST && self.picture.is_none() => {
+                self.picture = Picture::new(frame);
+                if let Some(Picture { frame, .. }) = &self.picture {
+                    self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
+                    self.scene.shading.weight_cutoff = frame.weight_cutoff;
+                }
+            }
+            Message::Tiles { first, count, epoch } if from == self.dispatcher && !self.stopped => {
+                let fits = self
+                    .picture
+                    .as_ref()
+                    .is_some_and(|p| count > 0 && first.checked_add(count).is_some_and(|end| end <= p.map.len()));
+                // A dispatcher never has more than two runs at a node; one that does is not heard.
+                if fits && self.runs.push_back(Run { first, count, epoch, done: 0, nanoseconds: 0 }).is_ok() {
+                    self.runs_given += 1;
+                }
+            }
+            Message::Finished { tile: u32::MAX } if from == self.dispatcher => self.report = true,
+            Message::Stop if from == HOST => self.stop(),
+            Message::Rays { .. } | Message::Took { .. } | Message::Partials { .. } if !self.stopped => {
+                self.handle_rays(from, view);
+            }
+            Message::Share { with } if from == self.dispatcher && !self.stopped => self.share(with),
+            Message::Fetch { page } => self.memory.peers.fetch(from, page),
+            Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
+            _ => {}
+        }
+    }
+
+    /// Gives half of the bundle's rays that are still to be shaded, and that hit something, to a node that has nothing
+    /// to do; or lets it know that there are none.
+    fn share(&mut self, with: Peer) {
+        let Some(picture) = &self.picture else { return };
+        let Bundle { rays, walked, places, .. } = &mut *self.memory.bundle;
+        if with == self.me || with == HOST || self.memory.peers.get(with).is_none_or(|p| p.lost) {
+            return;
+        }
+        let outbox = self.memory.peers.send(with, 0);
+        if let Stage::Shading { sample, next, mut end } = self.stage {
+            let most = (end - next).div_ceil(2).min(usize::from(self.settings.granularity));
+            let mut given = 0;
+            for at in (next..end).rev() {
+                if given == most {
+                    break;
+                }
+                let best = walked[at].best;
+                if walked[at].needs.is_some() || !best.candidate.is_hit() {
+                    continue;
+                }
+                let tile = self.in_work.tiles[usize::from(places[at].tile)];
+                let ray = primary(&picture.frame, &rays[at], &places[at], &best, sample, tile, self.me);
+                if self.memory.pool.push_to(outbox, RayRecord { settled: 1, page: best.page, ..ray }).is_err() {
+                    break;
+                }
+                given += 1;
+                end -= 1;
+                rays.swap(at, end);
+                walked.swap(at, end);
+                places.swap(at, end);
+            }
+            self.stage = Stage::Shading { sample, next, end };
+        }
+    }
+
+    /// What is in work is lost; what was done is still told.
+    fn stop(&mut self) {
+        self.runs.clear();
+        self.done.clear();
+        self.stage = Stage::Idle;
+        (self.depth, self.aside) = (0, None);
+        self.memory.tiles.fill(OpenTile::FREE);
+        self.stopped = true;
+        self.report = true;
+    }
+
+    /// A peer is gone. Rays that were there, or on their way, are gone with it, and nobody knows whose: the tiles that
+    /// are open here are traced again, under a new epoch. Pages come from their home from now on.
+    pub fn lost(&mut self, peer: Peer) {
+        let Some(state) = self.memory.peers.get(peer) else { return };
+        state.lost = true;
+        state.full = false;
+        let mut lists = [core::mem::take(&mut state.outbox), core::mem::take(&mut state.flight)];
+        for list in &mut lists {
+            while self.memory.pool.pop(list).is_some() {}
+        }
+        if let Some(owed) = self.memory.owed.get_mut(usize::from(peer)) {
+            let mut owed = core::mem::take(owed);
+            while self.memory.partials.pop_front(&mut owed).is_some() {}
+        }
+        for request in self.requests.iter_mut().filter(|r| r.from == peer) {
+            (request.from, request.sent) = (HOST, false);
+        }
+        if self.memory.pool.capacity() > 0 && peer != HOST {
+            for tile in self.memory.tiles.iter_mut().filter(|t| t.stage == TileStage::Open) {
+                tile.again();
+            }
+        }
+    }
+
+    /// Traces for a while: at most as many units as the settings say, and one bundle of primary rays. Returns whether
+    /// there was anything to do. `clock` is asked before and after.
+    pub fn step(&mut self, clock: &mut dyn FnMut() -> u64) -> bool {
+        let (before, done) = (clock(), self.done.len());
+        let worked = self.work();
+        self.idle = !worked;
+        if worked {
+            let spent = clock().saturating_sub(before);
+            self.busy += spent;
+            let run = if self.done.len() > done { self.done.back_mut() } else { self.runs.front_mut() };
+            if let Some(run) = run {
+                run.nanoseconds += spent;
+            }
+        }
+        worked
+    }
+
+    fn work(&mut self) -> bool {
+        let Some(picture) = &self.picture else { return false };
+        let frame = &picture.frame;
+        let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, .. } = &mut self.memory;
+        let Bundle { rays, walked, places, scratch, stack } = &mut **bundle;
+        let scene = self.scene.at_hand(&self.store);
+        let mut walker = Walker { kernels: self.kernels, stack, counts: Default::default() };
+        let mut lane = Lane::resume(lane, self.depth);
+        let mut counts = Counts::default();
+        let mut sums = Sums {
+            step: picture.step,
+            me: self.me,
+            tiles,
+            hint: 0,
+            partials,
+            lists: owed,
+            owing,
+            counts: Counts::default(),
+        };
+        let mut units = 0;
+        let mut bundles = 0;
+        while units < self.settings.steps {
+            // A unit adds to one pixel.
+            if pool.capacity() > 0 && sums.partials.free() == 0 {
+                break;
+            }
+            units += 1;
+            if let Some(ray) = self.aside.take() {
+                self.aside = if at_hand(&scene, ray.page) {
+                    lane.take(&scene, &mut walker, ray, &mut sums, &mut counts)
+                } else {
+                    pool.push(ray, false).err()
+                };
+                if self.aside.is_some_and(|ray| !at_hand(&scene, ray.page)) && pool.free() == 0 {
+                    break;
+                }
+                continue;
+            }
+            if !lane.is_empty() {
+                if let Some(ray) = lane.step(&scene, &mut walker, &mut sums, &mut counts) {
+                    self.aside = pool.push(ray, false).err();
+                }
+                continue;
+            }
+            if let Some(page) = pool.ready_page() {
+                if !at_hand(&scene, page) {
+                    pool.not_ready();
+                } else if let Some(ray) = pool.pop_ready() {
+                    if let Some(ray) = lane.take(&scene, &mut walker, ray, &mut sums, &mut counts) {
+                        let here = at_hand(&scene, ray.page);
+                        self.aside = pool.push(ray, here).err();
+                    }
+                }
+                continue;
+            }
+            match self.stage {
+                Stage::Shading { sample, next, end } if next < end => {
+                    let (place, went) = (&places[next], &walked[next]);
+                    let tile = self.in_work.tiles[usize::from(place.tile)];
+                    let ray = primary(frame, &rays[next], place, &went.best, sample, tile, self.me);
+                    match went.needs {
+                        // It may have come since the bundle was traced.
+                        Some(page) => self.aside = pool.push(RayRecord { page, ..ray }, at_hand(&scene, page)).err(),
+                        None => lane.start(&scene, &ray, &went.best, &mut sums, &mut counts),
+                    }
+                    self.stage = Stage::Shading { sample, next: next + 1, end };
+                }
+                // Samples of one pixel draw on each other's pages; but one bundle a step is enough.
+                Stage::Shading { sample, .. } if sample + 1 < frame.samples => {
+                    if bundles == 1 {
+                        break;
+                    }
+                    bundles += 1;
+                    let count = self.in_work.rays;
+                    start_sample(picture, sample + 1, &places[..count], &mut rays[..count]);
+                    trace_bundle(&scene, &rays[..count], walked, scratch, &mut walker);
+                    counts.primary += count as u64;
+                    self.stage = Stage::Shading { sample: sample + 1, next: 0, end: count };
+                }
+                Stage::Shading { .. } => {
+                    self.stage = Stage::Idle;
+                    if self.in_work.of_run && let Some(run) = self.runs.front_mut() {
+                        run.done += self.in_work.count as u32;
+                        self.tiles += self.in_work.count as u32;
+                        if run.done == run.count && let Some(run) = self.runs.pop_front() {
+                            // There is room: no more runs are taken in than this queue holds, and each is told before
+                            // the next ends.
+                            let _ = self.done.push_back(run);
+                            // What comes next is another run's time.
+                            break;
+                        }
+                    }
+                }
+                Stage::Idle if bundles == 1 => break,
+                Stage::Idle => {
+                    let room = pool.capacity() == 0
+                        || (pool.len() < self.settings.in_system as usize && pool.free() >= pool.capacity() / 2);
+                    let begun = if room { begin(picture, &self.runs, sums.tiles, self.settings.bundle_tiles) } else { None };
+                    let Some(begun) = begun else {
+                        units -= 1;
+                        break;
+                    };
+                    bundles += 1;
+                    let count = begun.place(picture, places);
+                    self.in_work = InWork { rays: count, ..begun };
+                    start_sample(picture, 0, &places[..count], &mut rays[..count]);
+                    trace_bundle(&scene, &rays[..count], walked, scratch, &mut walker);
+                    counts.primary += count as u64;
+                    self.stage = Stage::Shading { sample: 0, next: 0, end: count };
+                }
+            }
+        }
+        self.depth = lane.depth();
+        self.walk_counts += walker.counts;
+        counts += sums.counts;
+        self.counts += counts;
+        let open = self.memory.tiles.iter().filter(|t| t.stage != TileStage::Free).count();
+        self.high_water.tiles = (self.high_water.tiles.0.max(open), self.memory.tiles.len());
+        units > 0
+    }
+
+    /// Sends what is finished, and what has to be said. Returns whether anything was sent. Bounded: a frame for each peer
+    /// that waits for one.
+    pub fn poll(&mut self, link: &mut dyn Link, now: u64) -> bool {
+        let mut sent = self.greet(link);
+        // The host hears who it is before it hears anything else: a stranger's contributions must not come first.
+        if !self.greeted[0] {
+            return sent;
+        }
+        if self.memory.pool.capacity() > 0 {
+            sent |= self.answer(link);
+            sent |= self.pay(link);
+            sent |= self.serve(link);
+            self.decide(now);
+            sent |= self.ask(link);
+            sent |= self.forward(link, now);
+        }
+        sent |= self.send_tiles(link);
+        while let Some(run) = self.done.front() {
+            let done = Message::Done { first: run.first, count: run.count, nanoseconds: run.nanoseconds };
+            if !send(link, self.dispatcher, &done) {
+                break;
+            }
+            self.done.pop_front();
+            sent = true;
+        }
+        if self.helped && self.idle && self.memory.pool.len() == 0 {
+            self.helped = !send(link, self.dispatcher, &Message::Idle);
+            sent |= !self.helped;
+        }
+        let open = self.memory.tiles.iter().any(|t| t.stage != TileStage::Free);
+        if self.report && self.runs.is_empty() && self.done.is_empty() && self.stage == Stage::Idle && !open {
+            let report = Message::Report {
+                counts: self.counts,
+                tiles: self.tiles,
+                runs: self.runs_given,
+                busy_nanoseconds: self.busy,
+            };
+            self.report = !send(link, HOST, &report);
+            sent |= !self.report;
+        }
+        sent
+    }
+
+    fn greet(&mut self, link: &mut dyn Link) -> bool {
+        let mut sent = false;
+        for (i, peer) in [HOST, self.dispatcher].into_iter().enumerate() {
+            // A dispatcher elsewhere may be quicker than the host: it hears of this node once the picture has begun.
+            let ready = peer == HOST || self.picture.is_some();
+            if !self.greeted[i] && ready {
+                let twice = i == 1 && peer == HOST;
+                let hello = Message::Hello { version: hybray_wire::VERSION, scene: self.scene_hash };
+                self.greeted[i] = twice || send(link, peer, &hello);
+                sent |= self.greeted[i];
+            }
+        }
+        sent
+    }
+
+    /// Looks at wanted pages, and has their rays go there or the pages come here.
+    fn decide(&mut self, now: u64) {
+        let (load, idle) = (self.memory.pool.ready_rays() as u32, self.idle);
+        // The lane first: nothing else must take its turn.
+        if let Some(ray) = self.aside.filter(|ray| !at_hand(&self.scene.at_hand(&self.store), ray.page)) {
+            self.request(ray.page, true);
+        }
+        let count = self.memory.pool.wanted().len();
+        for _ in 0..count.min(DECISIONS) {
+            let wanted = self.memory.pool.wanted();
+            if wanted.is_empty() {
+                break;
+            }
+            self.looked_at = if self.looked_at < wanted.len() { self.looked_at } else { 0 };
+            let page = wanted[self.looked_at];
+            self.looked_at += 1;
+            let state = *self.memory.pool.page(page);
+            if state.asked {
+                continue;
+            }
+            let entry = self.scene.resident.directory.entries[page as usize];
+            let Some(oldest) = self.memory.pool.oldest(page) else { continue };
+            let kind = oldest.ray_kind();
+            let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
+            let situation = Situation {
+                rays: self.memory.pool.waiting(page) as u32,
+                kind,
+                page_bytes: entry.bytes,
+                uses: u32::from(state.uses),
+                owner_is_full: owner.full,
+                owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
+                owner_load: u32::from(owner.load),
+                load,
+                idle,
+                granularity: u32::from(self.settings.granularity),
+                ray_ns: self.settings.ray_ns,
+                link: self.settings.link,
+            };
+            match decide(self.settings.policy, &situation) {
+                Choice::Forward => {
+                    let outbox = self.memory.peers.send(entry.owner, now);
+                    self.memory.pool.move_to(page, outbox);
+                }
+                Choice::Fetch => {
+                    if !self.request(page, false) && owner.full && situation.owner_traces {
+                        // No place for the page either: the owner is asked once more.
+                        let outbox = self.memory.peers.send(entry.owner, now);
+                        self.memory.pool.move_to(page, outbox);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Reserves a place for `page`, and has it asked for.
+    fn request(&mut self, page: u32, for_lane: bool) -> bool {
+        let limit = if for_lane { REQUESTS_MAX + 1 } else { usize::from(self.settings.requests).clamp(1, REQUESTS_MAX) };
+        if self.requests.iter().any(|r| r.page == page) {
+            return true;
+        }
+        if self.requests.len() >= limit {
+            return false;
+        }
+        let owner = self.scene.resident.directory.entries[page as usize].owner;
+        let lost = owner == self.me || self.memory.peers.get(owner).is_none_or(|p| p.lost);
+        let from = if lost { HOST } else { owner };
+        let pool = &self.memory.pool;
+        if !self.store.reserve(page, for_lane, &|p| pool.waiting(p) > 0) {
+            return false;
+        }
+        self.memory.pool.page(page).asked = true;
+        // There is room: the limit was looked at.
+        let _ = self.requests.push(Request { page, from, sent: false });
+        self.high_water.requests = (self.high_water.requests.0.max(self.requests.len()), REQUESTS_MAX + 1);
+        self.high_water.page_bytes = self.high_water.page_bytes.max(self.store.bytes_held());
+        true
+    }
+}
+
+/// Whether a ray that needs `page` can go on here.
+fn at_hand<P: Pages + ?Sized>(scene: &Scene<'_, P>, page: u32) -> bool {
+    page == FROM_ROOT || scene.resident.pages.page(page).is_some()
+}
+
+/// The primary rays of one sample.
+fn start_sample(picture: &Picture, sample: u16, places: &[Place], rays: &mut [Ray]) {
+    let frame = &picture.frame;
+    for (place, ray) in places.iter().zip(rays) {
+        let pixel_id = id::pixel_id(frame.seed, place.y * frame.width + place.x);
+        let offset = sample_offset(picture.filter, pixel_id, u32::from(sample), u32::from(frame.samples));
+        let seen = picture.camera.ray(place.x, place.y, offset);
+        *ray = Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY };
+    }
+}
+
+fn trace_bundle<P: Pages + ?Sized>(
+    scene: &Scene<'_, P>,
+    rays: &[Ray],
+    walked: &mut [hybray_bintree::walk::Walked],
+    scratch: &mut wide::Scratch,
+    walker: &mut Walker<'_>,
+) {
+    let (kernels, magnitude) = (walker.kernels, scene.magnitude);
+    wide::nearest(kernels, &scene.resident, magnitude, rays, walked, scratch, walker.stack, &mut walker.counts);
+}
+
+fn primary(
+    frame: &hybray_wire::Frame,
+    ray: &Ray,
+    place: &Place,
+    best: &Hit,
+    sample: u16,
+    (tile, epoch): (u32, u16),
+    home: Peer,
+) -> RayRecord {
+    RayRecord {
+        origin: ray.origin.to_array(),
+        direction: ray.direction.to_array(),
+        t_min: ray.t_min,
+        t_max: best.candidate.t,
+        id: id::primary_id(frame.seed, place.y * frame.width + place.x, u32::from(sample)),
+        primitive: best.candidate.id,
+        hit_page: best.page,
+        slot: best.slot.0,
+        weight: [1.0; 3],
+        pixel: place.pixel,
+        tile,
+        page: FROM_ROOT,
+        epoch,
+        home,
+        kind: RayKind::Primary as u8,
+        depth: 1,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// Opens the tiles of the next bundle: one that is to be traced again, or the next of the oldest run. `None` if there is
+/// none, or no place for them.
+fn begin(
+    picture: &Picture,
+    runs: &heapless::Deque<Run, RUNS>,
+    tiles: &mut [OpenTile],
+    bundle_tiles: u8,
+) -> Option<InWork> {
+    let mut work = InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false };
+    if let Some(tile) = tiles.iter_mut().find(|t| t.stage == TileStage::Again) {
+        let (number, epoch) = (tile.tile, tile.epoch);
+        tile.open(&picture.frame, &picture.map, number, epoch);
+        work.tiles[0] = (number, epoch);
+        work.count = 1;
+        return Some(work);
+    }
+    let run = runs.front()?;
+    let first = run.first + run.done;
+    let count = if bundle_tiles >= 4 { picture.map.square(first, run.count - run.done) } else { 1 } as usize;
+    if tiles.iter().filter(|t| t.stage == TileStage::Free).count() < count {
+        return None;
+    }
+    work.count = count;
+    work.of_run = true;
+    for (tile, work) in (first..).zip(&mut work.tiles[..count]) {
+        *work = (tile, run.epoch);
+        if let Some(place) = tiles.iter_mut().find(|t| t.stage == TileStage::Free) {
+            place.open(&picture.frame, &picture.map, tile, run.epoch);
+        }
+    }
+    Some(work)
+}
+
+impl InWork {
+    /// Fills in where the bundle's rays belong; returns how many they are.
+    fn place(&self, picture: &Picture, places: &mut [Place; BUNDLE]) -> usize {
+        let first = picture.map.tile(self.tiles[0].0);
+        let mut rays = 0;
+        if self.count == TILES {
+            // A square along Morton's curve: halves of it, and of these, are compact.
+            let (right, below) = (picture.map.tile(self.tiles[1].0), picture.map.tile(self.tiles[2].0));
+            let (width, height) = (TILE + right.width, TILE + below.height);
+            for code in 0..BUNDLE as u32 {
+                let (x, y) = (even_bits(code), even_bits(code >> 1));
+                if x < width && y < height {
+                    let tile = (y / TILE) * 2 + x / TILE;
+                    let columns = if tile & 1 == 1 { right.width } else { TILE };
+                    let pixel = (y % TILE) * columns + x % TILE;
+                    places[rays] = Place { x: first.x + x, y: first.y + y, tile: tile as u8, pixel: pixel as u8 };
+                    rays += 1;
+                }
+            }
+        } else {
+            for code in 0..TILE_PIXELS as u32 {
+                let (x, y) = (even_bits(code), even_bits(code >> 1));
+                if x < first.width && y < first.height {
+                    let pixel = (y * first.width + x) as u8;
+                    places[rays] = Place { x: first.x + x, y: first.y + y, tile: 0, pixel };
+                    rays += 1;
+                }
+            }
+        }
+        rays
+    }
+}
+
+/// Every other bit, from the lowest.
+const fn even_bits(code: u32) -> u32 {
+    code & 1 | (code >> 1) & 2 | (code >> 2) & 4 | (code >> 3) & 8
+}

@@ -1,0 +1,44 @@
+//! A picture that is being traced, as a node sees it.
+
+use super::DEPTH_MAX;
+use crate::film::Step;
+use hybray_shading::{Camera, Filter};
+use hybray_wire::{Frame, TileMap};
+
+/// What a node makes of a [`Frame`].
+pub(super) struct Picture {
+    pub frame: Frame,
+    pub map: TileMap,
+    pub camera: Camera,
+    pub filter: Filter,
+    pub step: Step,
+}
+
+impl Picture {
+    pub fn new(frame: Frame) -> Option<Self> {
+        let camera = Camera::look(
+            frame.eye.into(),
+            frame.target.into(),
+            frame.up.into(),
+            frame.fov_y_degrees,
+            frame.hither,
+            frame.width,
+            frame.height,
+        );
+        let sound = frame.samples > 0 && (1..=DEPTH_MAX as u8).contains(&frame.depth_max);
+        Some(Self {
+            frame,
+            map: TileMap::new(frame.width, frame.height).filter(|_| sound)?,
+            camera: camera.ok()?,
+            filter: Filter::from_u32(u32::from(frame.filter))?,
+            step: Step::new(frame.step_log2),
+        })
+    }
+}
+
+/// Whether nodes can draw this picture: it has pixels, samples, a depth of 1 to 64, a filter, and a camera that looks
+/// somewhere. Ask before it begins: a node passes over what it cannot draw, and its tiles would be waited for.
+#[must_use]
+pub fn can_draw(frame: &Frame) -> bool {
+    Picture::new(*frame).is_some()
+}

@@ -1,0 +1,314 @@
+//! Where a node keeps pages: those that it owns, and a cache of others.
+//!
+//! A page lands in a place that was reserved for it before it was asked for. A page that rays wait for is not given up;
+//! among the others the one that was not used for longest goes (second chance). The last place is kept aside for the
+//! lane, so that one ray can always be finished on the spot (DESIGN section 2, law 3).
+
+use core::cell::Cell;
+use hybray_scene::{Line, PageView, Pages, Tables, lines_for};
+
+/// Pages at hand, and room for more.
+pub trait Store: Pages {
+    /// The bytes of a page that is at hand, to be sent to others.
+    fn bytes(&self, page: u32) -> Option<&[u8]>;
+
+    /// Reserves a place for `page`; false if there is none now. `keep` says which pages must stay. The lane may take the
+    /// place that is kept for it.
+    fn reserve(&mut self, page: u32, for_lane: bool, keep: &dyn Fn(u32) -> bool) -> bool;
+
+    /// Puts a part of `page` into its place.
+    fn land(&mut self, page: u32, offset: usize, part: &[u8]) -> Landed;
+
+    /// Bytes of pages that have a place here.
+    fn bytes_held(&self) -> u64;
+}
+
+/// What became of a part of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Landed {
+    /// More is to come.
+    Part,
+    /// The page is at hand.
+    Whole,
+    /// It is no page, or nobody asked for it: its place is free again.
+    Refused,
+}
+
+/// Every page of a scene, shared.
+#[derive(Clone, Copy)]
+pub struct All<'a>(pub &'a [PageView<'a>]);
+
+impl Pages for All<'_> {
+    #[inline(always)]
+    fn page(&self, number: u32) -> Option<PageView<'_>> {
+        self.0.get(number as usize).copied()
+    }
+}
+
+impl Store for All<'_> {
+    fn bytes(&self, _: u32) -> Option<&[u8]> {
+        None
+    }
+    fn reserve(&mut self, _: u32, _: bool, _: &dyn Fn(u32) -> bool) -> bool {
+        false
+    }
+    fn land(&mut self, _: u32, _: usize, _: &[u8]) -> Landed {
+        Landed::Refused
+    }
+    fn bytes_held(&self) -> u64 {
+        0
+    }
+}
+
+/// Where the bytes of pages are.
+pub trait Backing {
+    /// The page whose first line is `line`.
+    fn view(&self, page: u32, line: usize) -> PageView<'_>;
+    /// Its bytes.
+    fn bytes(&self, page: u32, line: usize) -> &[u8];
+    /// Writes a part of it; false if it does not belong there.
+    fn write(&mut self, page: u32, line: usize, offset: usize, part: &[u8]) -> bool;
+    /// Whether what was written is a page.
+    fn is_page(&self, page: u32, line: usize) -> bool;
+}
+
+/// Pages in memory of one's own, validated as they land.
+pub struct Own<'m> {
+    /// Carved for it.
+    pub lines: &'m mut [Line],
+    /// What pages may refer to.
+    pub tables: Tables,
+}
+
+impl Backing for Own<'_> {
+    #[inline(always)]
+    fn view(&self, _: u32, line: usize) -> PageView<'_> {
+        PageView::of_valid(&self.lines[line..])
+    }
+    fn bytes(&self, _: u32, line: usize) -> &[u8] {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.lines[line..]);
+        &bytes[..self.view(0, line).header.bytes as usize]
+    }
+    fn write(&mut self, _: u32, line: usize, offset: usize, part: &[u8]) -> bool {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.lines[line..]);
+        let room = offset.checked_add(part.len()).and_then(|end| bytes.get_mut(offset..end));
+        room.map(|room| room.copy_from_slice(part)).is_some()
+    }
+    fn is_page(&self, _: u32, line: usize) -> bool {
+        PageView::parse(&self.lines[line..], self.tables).is_ok()
+    }
+}
+
+/// Pages that are charged their bytes but refer to the one copy that the process has: for thousands of simulated nodes.
+pub struct Charged<'a>(pub &'a [PageView<'a>], pub &'a [&'a [u8]]);
+
+impl Backing for Charged<'_> {
+    #[inline(always)]
+    fn view(&self, page: u32, _: usize) -> PageView<'_> {
+        self.0[page as usize]
+    }
+    fn bytes(&self, page: u32, _: usize) -> &[u8] {
+        self.1[page as usize]
+    }
+    fn write(&mut self, page: u32, _: usize, offset: usize, part: &[u8]) -> bool {
+        let all = self.1[page as usize];
+        let there = offset.checked_add(part.len()).and_then(|end| all.get(offset..end));
+        debug_assert!(there.is_none_or(|there| there == part), "page {page} came changed");
+        there.is_some()
+    }
+    fn is_page(&self, _: u32, _: usize) -> bool {
+        true
+    }
+}
+
+/// A place in the cache.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The page in it; [`NOWHERE`] if it is free.
+    page: u32,
+    /// Bytes that have landed; [`WHOLE`] when the page is at hand.
+    landed: u32,
+    /// It was used since the hand passed.
+    used: Cell<bool>,
+}
+
+impl Place {
+    /// A place without a page.
+    pub const FREE: Self = Self { page: NOWHERE, landed: 0, used: Cell::new(false) };
+}
+
+const NOWHERE: u32 = u32::MAX;
+const WHOLE: u32 = u32::MAX;
+/// Tag of pages in the cache: the rest is the number of the place. Of others, the rest is their first line.
+const CACHED: u32 = 1 << 31;
+
+/// Pages that a node owns (or was given in advance), packed one behind the other, and behind them a cache of places of
+/// equal size.
+pub struct Cache<'m, B> {
+    backing: B,
+    /// Bytes of each page of the scene.
+    sizes: &'m [hybray_scene::PageEntry],
+    /// Of the directory.
+    parents: &'m [u32],
+    /// For each page of the scene: where it is.
+    at: &'m mut [u32],
+    places: &'m mut [Place],
+    place_lines: usize,
+    /// Lines in use by pages that stay.
+    fixed: usize,
+    hand: usize,
+    held: u64,
+}
+
+impl<'m, B: Backing> Cache<'m, B> {
+    /// An empty store. `at` has one entry for each page of the scene; the cache's `places` of `place_bytes` each come
+    /// behind the first `fixed_lines` lines. The last place is the lane's.
+    pub fn new(
+        backing: B,
+        sizes: &'m [hybray_scene::PageEntry],
+        parents: &'m [u32],
+        at: &'m mut [u32],
+        places: &'m mut [Place],
+        place_bytes: usize,
+    ) -> Self {
+        at.fill(NOWHERE);
+        places.fill_with(|| Place::FREE);
+        Self { backing, sizes, parents, at, places, place_lines: lines_for(place_bytes), fixed: 0, hand: 0, held: 0 }
+    }
+
+    /// Gives a page its place for good, before the start.
+    fn keep(&mut self, page: u32, bytes: usize) {
+        self.at[page as usize] = (self.places.len() * self.place_lines + self.fixed) as u32;
+        self.fixed += lines_for(bytes);
+        self.held += bytes as u64;
+    }
+
+    fn line(&self, place: usize) -> usize {
+        place * self.place_lines
+    }
+
+    /// The first line of a page that is at hand.
+    #[inline(always)]
+    fn line_of(&self, page: u32) -> Option<usize> {
+        let at = *self.at.get(page as usize)?;
+        if at == NOWHERE {
+            return None;
+        }
+        if at & CACHED == 0 {
+            return Some(at as usize);
+        }
+        let place = (at & !CACHED) as usize;
+        self.places[place].used.set(true);
+        (self.places[place].landed == WHOLE).then(|| self.line(place))
+    }
+
+    fn free(&mut self, place: usize) {
+        let page = core::mem::replace(&mut self.places[place], Place::FREE).page;
+        if page != NOWHERE {
+            self.at[page as usize] = NOWHERE;
+            self.held -= u64::from(self.sizes[page as usize].bytes);
+        }
+    }
+}
+
+impl Cache<'_, Own<'_>> {
+    /// Puts a page here for good, before the start; false if it is no page, or there is no room for it behind the cache.
+    pub fn put(&mut self, page: u32, bytes: &[u8]) -> bool {
+        let line = self.places.len() * self.place_lines + self.fixed;
+        let fits = line + lines_for(bytes.len()) <= self.backing.lines.len();
+        if !fits || !self.backing.write(page, line, 0, bytes) || !self.backing.is_page(page, line) {
+            return false;
+        }
+        self.keep(page, bytes.len());
+        true
+    }
+}
+
+impl Cache<'_, Charged<'_>> {
+    /// Charges for a page that stays.
+    pub fn put(&mut self, page: u32, bytes: usize) {
+        self.keep(page, bytes);
+    }
+}
+
+impl<B: Backing> Pages for Cache<'_, B> {
+    #[inline(always)]
+    fn page(&self, number: u32) -> Option<PageView<'_>> {
+        self.line_of(number).map(|line| self.backing.view(number, line))
+    }
+
+    fn parents(&self) -> &[u32] {
+        self.parents
+    }
+}
+
+impl<B: Backing> Store for Cache<'_, B> {
+    fn bytes(&self, page: u32) -> Option<&[u8]> {
+        self.line_of(page).map(|line| self.backing.bytes(page, line))
+    }
+
+    fn reserve(&mut self, page: u32, for_lane: bool, keep: &dyn Fn(u32) -> bool) -> bool {
+        let size = self.sizes[page as usize].bytes;
+        if self.at[page as usize] != NOWHERE || lines_for(size as usize) > self.place_lines {
+            return false;
+        }
+        let places = self.places.len();
+        let Some(common) = places.checked_sub(1) else { return false };
+        let can_go = |place: &Place| place.page == NOWHERE || (place.landed == WHOLE && !keep(place.page));
+        // Second chance: the hand goes round twice at most.
+        let mut found = None;
+        for _ in 0..2 * common {
+            let at = self.hand;
+            self.hand = (self.hand + 1) % common;
+            let place = &self.places[at];
+            if !can_go(place) {
+                continue;
+            }
+            if place.page == NOWHERE || !place.used.replace(false) {
+                found = Some(at);
+                break;
+            }
+        }
+        // Whoever else waits for the page in the lane's place waits on: the lane must come on.
+        let lanes = |place: &Place| place.page == NOWHERE || place.landed == WHOLE;
+        let found = found.or_else(|| (for_lane && places > 0 && lanes(&self.places[common])).then_some(common));
+        let Some(place) = found else { return false };
+        self.free(place);
+        self.places[place] = Place { page, landed: 0, used: Cell::new(true) };
+        self.at[page as usize] = CACHED | place as u32;
+        self.held += u64::from(size);
+        true
+    }
+
+    fn land(&mut self, page: u32, offset: usize, part: &[u8]) -> Landed {
+        let at = self.at.get(page as usize).copied().unwrap_or(NOWHERE);
+        if at == NOWHERE || at & CACHED == 0 {
+            return Landed::Refused;
+        }
+        let place = (at & !CACHED) as usize;
+        if self.places[place].landed == WHOLE {
+            return Landed::Refused;
+        }
+        let size = self.sizes[page as usize].bytes as usize;
+        let line = self.line(place);
+        let in_order = offset == self.places[place].landed as usize && !part.is_empty() && offset + part.len() <= size;
+        if !in_order || !self.backing.write(page, line, offset, part) {
+            self.free(place);
+            return Landed::Refused;
+        }
+        self.places[place].landed += part.len() as u32;
+        if offset + part.len() < size {
+            return Landed::Part;
+        }
+        if !self.backing.is_page(page, line) || self.backing.bytes(page, line).len() != size {
+            self.free(place);
+            return Landed::Refused;
+        }
+        self.places[place].landed = WHOLE;
+        Landed::Whole
+    }
+
+    fn bytes_held(&self) -> u64 {
+        self.held
+    }
+}

@@ -1,0 +1,273 @@
+//! What a node's budget is spent on: decided before anything starts, and carved once (DESIGN section 2, law 2).
+//!
+//! What must be there comes first: tables, directory, the lane, a bundle. Then shares of the budget for tiles, rays and
+//! partial sums. The rest is for pages: those that the node owns, and a cache. docs/MEMORY.md explains each term.
+
+use crate::node::{Cache, CachePlace, Charged, Limits, NodeMemory, Own, Settings};
+use crate::policy::Policy;
+use hybray_arena::{Arena, Short, Sum};
+use hybray_bintree::walk::Resident;
+use hybray_scene::{Directory, Line, Node as TreeNode, PageEntry, PageView, Tables, lines_for, parents};
+use hybray_shading::{Light, Material};
+use hybray_tracer::Scene;
+
+/// What of a scene takes memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Pages.
+    pub pages: usize,
+    /// Bytes of all pages, each rounded up to whole lines.
+    pub pages_bytes: u64,
+    /// Bytes of the largest page, rounded up to whole lines.
+    pub page_bytes_max: usize,
+    /// Nodes of the directory.
+    pub directory_nodes: usize,
+    /// Materials.
+    pub materials: usize,
+    /// Lights.
+    pub lights: usize,
+}
+
+impl Sizes {
+    /// Those of `scene`.
+    #[must_use]
+    pub fn of(scene: &Scene<'_>) -> Self {
+        let directory = scene.resident.directory;
+        let bytes = |entry: &PageEntry| lines_for(entry.bytes as usize) * size_of::<Line>();
+        Self {
+            pages: directory.entries.len(),
+            pages_bytes: directory.entries.iter().map(|entry| bytes(entry) as u64).sum(),
+            page_bytes_max: directory.entries.iter().map(bytes).max().unwrap_or(size_of::<Line>()),
+            directory_nodes: directory.nodes.len(),
+            materials: scene.shading.materials.len(),
+            lights: scene.shading.lights.len(),
+        }
+    }
+}
+
+/// Why a budget does not do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// What every node must have does not fit.
+    #[error(
+        "{memory} bytes are too few for a node of this scene on {nodes} nodes: give each {needed} bytes or more"
+    )]
+    Memory {
+        /// The budget.
+        memory: u64,
+        /// Nodes.
+        nodes: u16,
+        /// The least that would do.
+        needed: u64,
+    },
+    /// All nodes together cannot hold the pages.
+    #[error(
+        "the scene has {pages} bytes of pages, and {nodes} nodes of {memory} bytes have room for {room}: take \
+         {nodes_needed} nodes, or give each {needed} bytes"
+    )]
+    Pages {
+        /// Bytes of all pages.
+        pages: u64,
+        /// What all nodes together can hold.
+        room: u64,
+        /// The budget.
+        memory: u64,
+        /// Nodes.
+        nodes: u16,
+        /// Nodes that would do with this budget; 0 if no number of them would.
+        nodes_needed: u64,
+        /// Budget that would do with so many nodes.
+        needed: u64,
+    },
+}
+
+/// Places of the cache at least: one, and the lane's.
+const PLACES_MIN: usize = 2;
+/// Shares of the budget, and what they are kept within.
+const TILES: (u64, u64, u64) = (64, 8, 256);
+const RAYS: (u64, u64, u64) = (16, 256, 16_384);
+const PARTIALS: (u64, u64, u64) = (64, 64, 4_096);
+
+/// What a node is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The scene.
+    pub sizes: Sizes,
+    /// Pools.
+    pub limits: Limits,
+    /// Places of the cache, the lane's included.
+    pub places: usize,
+    /// Lines for pages: the cache's first, then those of pages that stay.
+    pub lines: usize,
+    /// Whether the node has room for every page.
+    pub holds_all: bool,
+}
+
+impl Plan {
+    /// Divides `memory` bytes of each of `nodes` nodes up. `owned_max` is the most bytes of pages, rounded up to lines,
+    /// that any node is to own: by an even share of them if it is `None`. The 1995 report's policies have each node keep
+    /// its own pages only; with the others, nodes that have the room keep every page.
+    ///
+    /// # Errors
+    /// If it does not do: what would.
+    pub fn new(
+        sizes: Sizes,
+        nodes: u16,
+        memory: u64,
+        owned_max: Option<u64>,
+        policy: Policy,
+    ) -> Result<Self, PlanError> {
+        let share = |(part, least, most): (u64, u64, u64), size: usize| {
+            (memory / part / size as u64).clamp(least, most) as usize
+        };
+        let limits = Limits {
+            peers: usize::from(nodes) + 1,
+            pages: sizes.pages,
+            rays: share(RAYS, 92),
+            tiles: share(TILES, 1608),
+            partials: share(PARTIALS, 44),
+        };
+        let mut plan = Self { sizes, limits, places: PLACES_MIN, lines: 0, holds_all: false };
+        let place_lines = lines_for(sizes.page_bytes_max);
+        let line = size_of::<Line>() as u64;
+        let least = plan.sum().total_bytes() + (PLACES_MIN * place_lines) as u64 * line;
+        // An uneven share is at most one page more than an even one.
+        let even = sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64;
+        let owned = owned_max.unwrap_or(even.min(sizes.pages_bytes));
+        if memory < least {
+            return Err(PlanError::Memory { memory, nodes, needed: least + owned });
+        }
+        let room = memory - least;
+        if room < owned {
+            let total = sizes.pages_bytes;
+            let spare = room.saturating_sub(sizes.page_bytes_max as u64);
+            return Err(PlanError::Pages {
+                pages: total,
+                room: room * u64::from(nodes),
+                memory,
+                nodes,
+                nodes_needed: if spare == 0 { 0 } else { total.div_ceil(spare) },
+                // The shares grow with the budget.
+                needed: least + owned + owned / 4,
+            });
+        }
+        let keeps_others = matches!(policy, Policy::Hybrid | Policy::DemandDriven);
+        plan.holds_all = keeps_others && room >= sizes.pages_bytes;
+        if plan.holds_all {
+            plan.lines = PLACES_MIN * place_lines + (sizes.pages_bytes / line) as usize;
+        } else {
+            let free = room - owned;
+            let place = place_lines as u64 * line + size_of::<CachePlace>() as u64 + 64;
+            if policy != Policy::DataParallel {
+                plan.places = PLACES_MIN + ((free / place) as usize).min(sizes.pages);
+            }
+            plan.lines = plan.places * place_lines + (owned / line) as usize;
+        }
+        Ok(plan)
+    }
+
+    /// A node without a budget: it has every page, and no ray ever waits.
+    #[must_use]
+    pub fn without_budget(sizes: Sizes) -> Self {
+        let limits = Limits { pages: 0, ..Limits::all_at_hand() };
+        let lines = sizes.pages_bytes as usize / size_of::<Line>();
+        Self { sizes, limits, places: 0, lines, holds_all: true }
+    }
+
+    /// Bytes of pages, rounded up to lines, that a node may own or be given for good.
+    #[must_use]
+    pub fn fixed_bytes(&self) -> u64 {
+        let cache = self.places * lines_for(self.sizes.page_bytes_max);
+        (self.lines.saturating_sub(cache) * size_of::<Line>()) as u64
+    }
+
+    /// Bytes of pages, rounded up to lines, that a node could own if it had no more of a cache than it must.
+    #[must_use]
+    pub fn owned_bytes_max(&self) -> u64 {
+        let least = PLACES_MIN * lines_for(self.sizes.page_bytes_max);
+        (self.lines.saturating_sub(least) * size_of::<Line>()) as u64
+    }
+
+    /// Every term, in bytes.
+    #[must_use]
+    pub fn sum(&self) -> Sum {
+        let s = &self.sizes;
+        let mut sum = NodeMemory::sum(&self.limits);
+        sum.add::<TreeNode>("directory", s.directory_nodes);
+        sum.add::<PageEntry>("sizes and owners of pages", s.pages);
+        sum.add::<u32>("parents in the directory", s.directory_nodes + s.pages);
+        sum.add::<u32>("where pages are", s.pages);
+        sum.add::<Material>("materials", s.materials);
+        sum.add::<Light>("lights", s.lights);
+        sum.add::<CachePlace>("places of the cache", self.places);
+        sum.add::<Line>("pages", self.lines);
+        sum
+    }
+
+    /// Carves a node out of `arena`: what it works in, its pages, and its copy of the tables.
+    ///
+    /// # Errors
+    /// If the arena is smaller than [`Plan::sum`].
+    pub fn carve<'m>(
+        &self,
+        arena: &mut Arena<'m>,
+        scene: &Scene<'_>,
+    ) -> Result<(NodeMemory<'m>, Cache<'m, Own<'m>>, Scene<'m>), Short> {
+        let memory = NodeMemory::carve(arena, &self.limits)?;
+        let (from, shading) = (scene.resident.directory, &scene.shading);
+        let nodes = &*arena.take_with("directory", from.nodes.len(), |i| from.nodes[i])?;
+        let entries = &*arena.take_with("sizes and owners of pages", from.entries.len(), |i| from.entries[i])?;
+        let up = arena.take("parents in the directory", nodes.len() + entries.len(), 0u32)?;
+        parents(nodes, up);
+        let at = arena.take("where pages are", entries.len(), 0u32)?;
+        let materials = &*arena.take_with("materials", shading.materials.len(), |i| shading.materials[i])?;
+        let lights = &*arena.take_with("lights", shading.lights.len(), |i| shading.lights[i])?;
+        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::FREE)?;
+        let lines = arena.take("pages", self.lines, Line([0; 64]))?;
+        let own = Own { lines, tables: Tables { materials: materials.len() } };
+        let cache = Cache::new(own, entries, up, at, places, self.sizes.page_bytes_max);
+        let scene = Scene {
+            resident: Resident { directory: Directory { nodes, entries }, pages: &[][..] },
+            shading: hybray_shading::Scene { materials, lights, ..*shading },
+            background: scene.background,
+            magnitude: scene.magnitude,
+            transmits: scene.transmits,
+        };
+        Ok((memory, cache, scene))
+    }
+
+    /// Bytes of memory that [`Plan::charge`] takes.
+    #[must_use]
+    pub fn charged_bytes(&self) -> u64 {
+        let mut sum = NodeMemory::sum(&self.limits);
+        sum.add::<u32>("where pages are", self.sizes.pages);
+        sum.add::<CachePlace>("places of the cache", self.places);
+        sum.total_bytes()
+    }
+
+    /// The same, for a node that is charged for its pages and tables but refers to the one copy of them in this process:
+    /// the arena is smaller by them. `up` is [`parents`] of the directory.
+    ///
+    /// # Errors
+    /// If the arena is too small.
+    pub fn charge<'m>(
+        &self,
+        arena: &mut Arena<'m>,
+        scene: &Scene<'m>,
+        up: &'m [u32],
+        bytes: &'m [&'m [u8]],
+    ) -> Result<(NodeMemory<'m>, Cache<'m, Charged<'m>>), Short> {
+        let memory = NodeMemory::carve(arena, &self.limits)?;
+        let at = arena.take("where pages are", self.sizes.pages, 0u32)?;
+        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::FREE)?;
+        let pages: &'m [PageView<'m>] = scene.resident.pages;
+        let entries = scene.resident.directory.entries;
+        Ok((memory, Cache::new(Charged(pages, bytes), entries, up, at, places, self.sizes.page_bytes_max)))
+    }
+
+    /// Settings that go with this plan.
+    #[must_use]
+    pub fn settings(&self, settings: Settings) -> Settings {
+        Settings { in_system: settings.in_system.min(self.limits.rays as u32 / 2), ..settings }
+    }
+}

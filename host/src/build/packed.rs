@@ -1,0 +1,265 @@
+//! What a build makes: pages, and the directory above them.
+
+use super::BuildError;
+use super::tree::VoxelTree;
+use crate::partition::{PlacedPage, Plan};
+use hybray_bintree::top;
+use hybray_bintree::walk::Resident;
+use hybray_geometry::Aabb;
+use hybray_scene::{Directory, Line, Node, PageEntry, PageView, Tables, lines_for};
+use rayon::prelude::*;
+
+/// The directory and what else is known of each page, without the pages.
+pub(crate) struct Index {
+    pub nodes: Vec<Node>,
+    pub entries: Vec<PageEntry>,
+    /// The voxel of each page.
+    pub voxels: Vec<u32>,
+    /// How many voxels there are, empty ones included.
+    pub voxel_count: u32,
+    /// Different primitives in each page.
+    pub primitives: Vec<u32>,
+    /// Hash of the pages in their order.
+    pub hash: u64,
+}
+
+/// Pages and directory of a scene, in the internal unit (file units times `2^scale_log2`).
+pub struct Packed {
+    index: Index,
+    /// Pages chunk by chunk, each at a line.
+    chunks: Vec<Vec<Line>>,
+    /// Chunk and first line of each page.
+    places: Vec<(u32, u32)>,
+    /// File units times 2 to this power are internal units: exact.
+    pub scale_log2: i32,
+    /// Greatest absolute coordinate, internal units.
+    pub magnitude: f32,
+    /// Materials that pages may refer to.
+    pub materials: usize,
+}
+
+const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Adds `bytes` and their number to a hash, eight at a time (FNV-1a over little-endian words, the last one filled up with
+/// zeros).
+#[must_use]
+pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
+    let length = (bytes.len() as u64).to_le_bytes();
+    bytes.chunks(8).chain([&length[..]]).fold(hash, |h, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        // The rotation brings what multiplication moves up back down.
+        (h ^ u64::from_le_bytes(word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+    })
+}
+
+/// The hash of a page.
+pub(crate) fn hash_page(lines: &[Line]) -> u64 {
+    hash_bytes(HASH_START, bytemuck::cast_slice(lines))
+}
+
+/// Different primitives in a page: one may stand in several leaves, and lanes are filled up by repetition.
+pub(crate) fn primitives_in(page: &PageView<'_>) -> u32 {
+    let triangles = page.triangles.iter().flat_map(|block| block.id);
+    let spheres = page.spheres.iter().flat_map(|block| block.id);
+    let mut ids: Vec<u32> = triangles.chain(spheres).chain(page.cones.iter().map(|cone| cone.id)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids.len() as u32
+}
+
+/// Validated pages, which [`Pages::resident`] lends.
+pub struct Pages<'a> {
+    packed: &'a Packed,
+    views: Vec<PageView<'a>>,
+}
+
+impl Packed {
+    /// Puts pages, chunk by chunk, under their directory. The pages follow each other as the index has them.
+    pub(crate) fn new(index: Index, chunks: Vec<Vec<Line>>, scale_log2: i32, materials: usize) -> Self {
+        let (mut chunk, mut line) = (0, 0);
+        let places = index.entries.iter().map(|entry| {
+            while chunks.get(chunk).is_some_and(|lines| lines.len() == line) {
+                (chunk, line) = (chunk + 1, 0);
+            }
+            let place = (chunk as u32, line as u32);
+            line += lines_for(entry.bytes as usize);
+            place
+        });
+        let places = places.collect();
+        let magnitude = index.nodes.first().map_or(0.0, |n| n.bounds().magnitude());
+        Self { index, chunks, places, scale_log2, magnitude, materials }
+    }
+
+    /// Bytes of all pages.
+    #[must_use]
+    pub fn page_bytes(&self) -> u64 {
+        self.index.entries.iter().map(|e| u64::from(e.bytes)).sum()
+    }
+
+    /// Bytes of the directory.
+    #[must_use]
+    pub fn directory_bytes(&self) -> u64 {
+        (size_of_val(&self.index.nodes[..]) + size_of_val(&self.index.entries[..])) as u64
+    }
+
+    /// Hash of directory and pages: equal for equal pages in equal order.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        self.index.hash()
+    }
+
+    /// How many pages there are.
+    #[must_use]
+    pub fn pages(&self) -> usize {
+        self.index.entries.len()
+    }
+
+    /// The bytes of a page, padded to whole lines.
+    #[must_use]
+    pub fn page(&self, page: u32) -> &[Line] {
+        let (chunk, first) = self.places[page as usize];
+        let lines = lines_for(self.index.entries[page as usize].bytes as usize);
+        &self.chunks[chunk as usize][first as usize..][..lines]
+    }
+
+    /// The bytes of each page.
+    #[must_use]
+    pub fn page_slices(&self) -> Vec<&[u8]> {
+        let slice = |(page, entry): (u32, &PageEntry)| {
+            let bytes: &[u8] = bytemuck::cast_slice(self.page(page));
+            &bytes[..entry.bytes as usize]
+        };
+        (0..).zip(&self.index.entries).map(slice).collect()
+    }
+
+    /// The directory's nodes and entries.
+    #[must_use]
+    pub fn directory(&self) -> Directory<'_> {
+        Directory { nodes: &self.index.nodes, entries: &self.index.entries }
+    }
+
+    /// The voxel that a page belongs to.
+    #[must_use]
+    pub fn voxel_of(&self, page: u32) -> u32 {
+        self.index.voxels[page as usize]
+    }
+
+    /// How many voxels there are, empty ones included.
+    #[must_use]
+    pub fn voxels(&self) -> u32 {
+        self.index.voxel_count
+    }
+
+    /// Different primitives in a page.
+    #[must_use]
+    pub fn primitives_of(&self, page: u32) -> u32 {
+        self.index.primitives[page as usize]
+    }
+
+    /// What [`crate::partition::owners`] needs to know: pages of whole lines, as they lie in memory.
+    #[must_use]
+    pub fn placed_pages(&self) -> Vec<PlacedPage> {
+        let bytes = |entry: &PageEntry| entry.bytes.next_multiple_of(size_of::<Line>() as u32);
+        let pages = self.index.entries.iter().zip(&self.index.voxels);
+        pages.map(|(entry, &voxel)| PlacedPage { bytes: bytes(entry), voxel }).collect()
+    }
+
+    /// Validates every page, as each node does with what it receives.
+    ///
+    /// # Errors
+    /// If the builder, or memory, is broken.
+    pub fn open(&self) -> Result<Pages<'_>, BuildError> {
+        let tables = Tables { materials: self.materials };
+        let views = (0..self.pages() as u32)
+            .into_par_iter()
+            .map(|page| PageView::parse(self.page(page), tables))
+            .collect::<Result<Vec<_>, _>>()?;
+        let Index { nodes, entries, .. } = &self.index;
+        Directory::parse(nodes, entries, &mut vec![0; nodes.len()])?;
+        Ok(Pages { packed: self, views })
+    }
+}
+
+impl<'a> Pages<'a> {
+    /// What a walk needs.
+    #[must_use]
+    pub fn resident(&'a self) -> Resident<'a> {
+        Resident { directory: self.packed.directory(), pages: &self.views }
+    }
+}
+
+impl Index {
+    /// What the hash of pages starts from.
+    pub const HASH_START: u64 = HASH_START;
+
+    /// Adds what is known of the next page.
+    pub fn add_page(&mut self, primitives: u32, hash: u64) {
+        self.primitives.push(primitives);
+        self.hash = hash_bytes(self.hash, &hash.to_le_bytes());
+    }
+
+    /// Hash of directory and pages.
+    pub fn hash(&self) -> u64 {
+        hash_bytes(hash_bytes(self.hash, bytemuck::cast_slice(&self.nodes)), bytemuck::cast_slice(&self.entries))
+    }
+}
+
+/// Puts the trees of voxels below the planes between them, and the directory above their pages. Told in preorder.
+pub(crate) struct Assembler {
+    top: top::Builder,
+    index: Index,
+}
+
+impl Assembler {
+    /// Nothing yet.
+    pub fn new(plan: &Plan) -> Self {
+        let index = Index {
+            nodes: Vec::new(),
+            entries: Vec::new(),
+            voxels: Vec::new(),
+            voxel_count: plan.voxels(),
+            primitives: Vec::new(),
+            hash: HASH_START,
+        };
+        Self { top: top::Builder::new(), index }
+    }
+
+    /// A node above voxels.
+    pub fn above(&mut self, aabb: &Aabb) {
+        self.top.above(aabb);
+    }
+
+    /// A voxel; returns its pages, chunk by chunk.
+    pub fn voxel(&mut self, voxel: u32, tree: VoxelTree) -> impl Iterator<Item = Vec<Line>> + use<> {
+        let mut chunks = tree.chunks.iter();
+        for node in &tree.tops {
+            if !node.is_leaf() {
+                self.top.above(&node.aabb);
+                continue;
+            }
+            for (aabb, about) in chunks.by_ref().take(1).flat_map(|chunk| &chunk.events) {
+                let Some(about) = about else {
+                    self.top.above(aabb);
+                    continue;
+                };
+                self.top.page(aabb, self.index.entries.len() as u32);
+                self.index.entries.push(PageEntry { bytes: about.bytes, owner: 0, kind: 0 });
+                self.index.voxels.push(voxel);
+                self.index.add_page(about.primitives, about.hash);
+            }
+        }
+        tree.chunks.into_iter().map(|chunk| chunk.lines)
+    }
+
+    /// The directory.
+    pub fn finish(mut self) -> Index {
+        let top = self.top.finish();
+        let mut nodes = vec![Node::EMPTY; top::nodes_for(self.index.entries.len())];
+        let used =
+            top::directory(&top, &mut nodes).expect("builders bound the depth, and there is a node for each page");
+        nodes.truncate(used);
+        self.index.nodes = nodes;
+        self.index
+    }
+}

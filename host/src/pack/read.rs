@@ -1,0 +1,242 @@
+//! Opening a `.hyb` file.
+//!
+//! The order is chosen so that no room is asked for that is not covered by checked bytes: the header against the length
+//! of the file; the table of pages, which says how long each is; then the rest, in pieces.
+
+use super::header::FileHeader;
+use super::tables::Rest;
+use crate::build::{Index, Packed, hash_bytes, hash_page, primitives_in};
+use crate::import;
+use crate::model::{Model, NamedMaterial};
+use bytemuck::Pod;
+use hybray_scene::{Child, Directory, Line, Node, PAGE_BYTES_MAX, PageEntry, PageView, Tables, lines_for};
+use hybray_shading::{Light, Material};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Why a packed scene cannot be used, as one line for a person.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {problem}; {remedy}")]
+pub struct HybError {
+    file: String,
+    problem: String,
+    remedy: &'static str,
+}
+
+/// What a packed scene holds.
+pub struct Packing {
+    /// Pages and directory.
+    pub packed: Packed,
+    /// Everything else: a model without primitives, whose materials have no names.
+    pub model: Model,
+    /// Triangles, spheres and cones.
+    pub primitives: [u64; 3],
+    /// Triangles with vertex normals.
+    pub smooth: u64,
+    /// The scene's box, file units.
+    pub extent: [[f32; 3]; 2],
+}
+
+/// Opens and checks a packed scene.
+///
+/// # Errors
+/// One line that names the file, what is wrong with it, and what to do.
+pub fn open(path: &Path) -> Result<Packing, HybError> {
+    let error = |(problem, remedy)| HybError { file: path.display().to_string(), problem, remedy };
+    read(path).map_err(error)
+}
+
+/// What is wrong, and what to do.
+type Complaint = (String, &'static str);
+
+const AGAIN: &str = "make it again with `hybray pack`";
+
+fn broken(problem: impl Into<String>) -> Complaint {
+    (problem.into(), AGAIN)
+}
+
+fn unreadable(error: &io::Error) -> Complaint {
+    (format!("it cannot be read ({error})"), "check the file and its disk")
+}
+
+fn read(path: &Path) -> Result<Packing, Complaint> {
+    let about = match std::fs::metadata(path) {
+        Ok(about) => about,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            return Err(("there is no such file".into(), "check the path"));
+        }
+        Err(e) => return Err((format!("it cannot be looked up ({e})"), "check the path")),
+    };
+    if !about.is_file() {
+        return Err(("it is no regular file".to_owned(), "name a file that `hybray pack` has made"));
+    }
+    let file = File::open(path).map_err(|e| (format!("it cannot be opened ({e})"), "check its permissions"))?;
+    read_from(file, about.len())
+}
+
+pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, Complaint> {
+    let mut sections = Sections { file };
+    if length < size_of::<FileHeader>() as u64 {
+        return Err(broken("this is no packed scene, or the beginning of one"));
+    }
+    let header: FileHeader = sections.read(0, 1)?[0];
+    header.check(length).map_err(broken)?;
+    let layout = header.layout();
+
+    let entries: Vec<PageEntry> = sections.read_checked(layout.entries, header.pages, |entry: &PageEntry| {
+        let fits = (1..=PAGE_BYTES_MAX as u32).contains(&entry.bytes) && entry.kind == 0 && entry.owner == 0;
+        if fits { Ok(()) } else { Err(broken("its table of pages has an entry that makes no sense")) }
+    })?;
+    let lines: u64 = entries.iter().map(|entry| lines_for(entry.bytes as usize) as u64).sum();
+    if lines != header.page_lines {
+        return Err(broken("its table of pages does not make their length"));
+    }
+    let mut before = 0;
+    let voxels: Vec<u32> = sections.read_checked(layout.voxels, header.pages, |&voxel: &u32| {
+        let follows = voxel >= before && voxel < header.voxels;
+        before = voxel;
+        if follows { Ok(()) } else { Err(broken("a page is in no voxel, or out of order")) }
+    })?;
+    let nodes = sections.read(layout.nodes, header.nodes as usize)?;
+    let materials: Vec<Material> = sections.read(layout.materials, header.materials as usize)?;
+    let lights: Vec<Light> = sections.read(layout.lights, header.lights as usize)?;
+    let rest_bytes: Vec<u8> = sections.read(layout.rest, header.rest_bytes as usize)?;
+    Directory::parse(&nodes, &entries, &mut vec![0; nodes.len()]).map_err(|e| broken(e.to_string()))?;
+    each_page_once(&nodes, entries.len())?;
+
+    let mut index =
+        Index { nodes, entries, voxels, voxel_count: header.voxels, primitives: Vec::new(), hash: Index::HASH_START };
+    let chunks = read_pages(&mut sections, layout.pages, &mut index, materials.len())?;
+    let tables: [&[u8]; 4] = [
+        bytemuck::cast_slice(&index.voxels),
+        bytemuck::cast_slice(&materials),
+        bytemuck::cast_slice(&lights),
+        &rest_bytes,
+    ];
+    if header.sealed(tables.into_iter().fold(index.hash(), hash_bytes)) != header {
+        return Err(broken("its bytes are not those that were written (the hash differs)"));
+    }
+    for (start, bytes) in layout.paddings(&header) {
+        if sections.read::<u8>(start, bytes)?.iter().any(|&byte| byte != 0) {
+            return Err(broken("there is something between its parts"));
+        }
+    }
+
+    let (rest, left): (Rest, _) =
+        postcard::take_from_bytes(&rest_bytes).map_err(|_| broken("its tables cannot be read"))?;
+    if !left.is_empty() {
+        return Err(broken("its tables have a rest that is not known here"));
+    }
+    let extent = rest.extent;
+    let model = Model {
+        materials: materials.into_iter().map(|material| NamedMaterial { material, ..Default::default() }).collect(),
+        lights,
+        ..rest.into_model()
+    };
+    import::validate(&model).map_err(|e| broken(e.to_string()))?;
+    if model.cameras.is_empty() {
+        return Err(broken("it has no camera"));
+    }
+    let packed = Packed::new(index, chunks, header.scale_log2, model.materials.len());
+    Ok(Packing { packed, model, primitives: header.primitives, smooth: header.smooth, extent })
+}
+
+/// Walks that go on from a page find their way back by its one place in the directory.
+fn each_page_once(nodes: &[Node], pages: usize) -> Result<(), Complaint> {
+    let mut seen = vec![false; pages];
+    for (_, child) in nodes.iter().flat_map(Node::children) {
+        if let Child::Page(page) = child
+            && std::mem::replace(&mut seen[page as usize], true)
+        {
+            return Err(broken(format!("its directory leads to page {page} more than once")));
+        }
+    }
+    match seen.iter().position(|&seen| !seen) {
+        Some(page) => Err(broken(format!("its directory does not lead to page {page}"))),
+        None => Ok(()),
+    }
+}
+
+/// Lines of a piece of the pages: 4 MiB, and up to a page more.
+const PIECE_LINES: usize = 1 << 16;
+
+/// Reads the pages piece by piece, each of whole pages, and checks each page before the next piece is read.
+fn read_pages(
+    sections: &mut Sections<impl Read + Seek>,
+    start: u64,
+    index: &mut Index,
+    materials: usize,
+) -> Result<Vec<Vec<Line>>, Complaint> {
+    let tables = Tables { materials };
+    let mut chunks = Vec::new();
+    let mut at = start;
+    let mut first = 0;
+    while first < index.entries.len() {
+        let (mut end, mut lines) = (first, 0);
+        while end < index.entries.len() && lines < PIECE_LINES {
+            lines += lines_for(index.entries[end].bytes as usize);
+            end += 1;
+        }
+        let piece: Vec<Line> = sections.read(at, lines)?;
+        let mut line = 0;
+        for page in first..end {
+            let bytes = index.entries[page].bytes;
+            let own = &piece[line..][..lines_for(bytes as usize)];
+            line += own.len();
+            let view = PageView::parse(own, tables).map_err(|e| broken(format!("page {page}: {e}")))?;
+            if view.header.bytes != bytes {
+                return Err(broken(format!("page {page} is not as long as the table says")));
+            }
+            index.add_page(primitives_in(&view), hash_page(own));
+        }
+        at += 64 * lines as u64;
+        first = end;
+        chunks.push(piece);
+    }
+    Ok(chunks)
+}
+
+/// A file, read section by section.
+struct Sections<F> {
+    file: F,
+}
+
+/// Bytes that are read at once, so that room grows with what there is to read.
+const STEP: usize = 1 << 22;
+
+impl<F: Read + Seek> Sections<F> {
+    fn read<T: Pod>(&mut self, start: u64, count: usize) -> Result<Vec<T>, Complaint> {
+        self.file.seek(SeekFrom::Start(start)).map_err(|e| unreadable(&e))?;
+        let mut all: Vec<T> = Vec::new();
+        let step = (STEP / size_of::<T>()).max(1);
+        while all.len() < count {
+            let from = all.len();
+            let next = step.min(count - from);
+            all.try_reserve(next).map_err(|_| ("there is no memory for it".to_owned(), "free some"))?;
+            all.resize(from + next, T::zeroed());
+            let bytes = bytemuck::cast_slice_mut(&mut all[from..]);
+            self.file.read_exact(bytes).map_err(|e| unreadable(&e))?;
+        }
+        Ok(all)
+    }
+
+    /// The same, checked item by item before more room is asked for.
+    fn read_checked<T: Pod>(
+        &mut self,
+        start: u64,
+        count: u32,
+        mut check: impl FnMut(&T) -> Result<(), Complaint>,
+    ) -> Result<Vec<T>, Complaint> {
+        let mut all: Vec<T> = Vec::new();
+        let step = STEP / size_of::<T>();
+        while all.len() < count as usize {
+            let from = all.len();
+            let next = step.min(count as usize - from);
+            let piece = self.read::<T>(start + (from * size_of::<T>()) as u64, next)?;
+            piece.iter().try_for_each(&mut check)?;
+            all.extend(piece);
+        }
+        Ok(all)
+    }
+}

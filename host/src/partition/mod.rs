@@ -1,0 +1,12 @@
+//! Who gets what of a scene: voxels (report, chapter 3), and where their pages live.
+//!
+//! Pure functions: nothing here holds pages, opens files, or knows what a node is doing. Lengths are in the scene's
+//! internal unit, memory in bytes.
+
+mod owners;
+mod replicas;
+mod voxels;
+
+pub use owners::{Misfit, PlacedPage, owners};
+pub use replicas::replicas;
+pub use voxels::{Plan, Step, VOXELS_MAX, Voxels};

@@ -1,0 +1,109 @@
+//! `hybray simulate`.
+
+use super::args::{SimulateArgs, Where};
+use super::render::{check_camera, interrupts};
+use super::report::ReportFile;
+use super::show::Show;
+use super::{End, camera, load};
+use crate::model::Settings;
+use crate::prepare::Prepared;
+use crate::simulate::record::{Report, Run};
+use crate::simulate::runs::{Experiment, name_of, scheduler};
+use crate::simulate::{csv, html};
+use anyhow::{Context, Result, bail};
+use hybray_link::HOST;
+use hybray_scheduler::Options;
+use hybray_scheduler::policy::Policy;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+pub(super) fn run(args: &SimulateArgs) -> Result<End> {
+    let interrupted = interrupts()?;
+    let policies = args.scheduler.iter().map(|name| {
+        let known = || Policy::ALL.map(|(name, _)| name).join(", ");
+        scheduler(name).with_context(|| format!("there is no scheduler `{name}`; there are {}", known()))
+    });
+    let policies = policies.collect::<Result<Vec<_>>>()?;
+    // What could go wrong at the end is tried at the beginning.
+    let outputs = [&args.json, &args.csv, &args.html];
+    let to_standard_output = |path: &&Option<PathBuf>| path.as_deref() == Some(Path::new("-"));
+    if outputs.iter().filter(|path| to_standard_output(path)).count() > 1 {
+        bail!("only one of --json, --csv and --html can go to standard output: give the others a file");
+    }
+    let [json, csv, html] = outputs.map(|path| path.as_deref().map(ReportFile::create).transpose());
+    let (json, csv, html) = (json?, csv?, html?);
+
+    let mut show = Show::new(args.quiet);
+    let (model, _) = load(&args.scene, args.size)?;
+    model.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
+    let camera = camera(&model.cameras, args.camera.as_deref())?.clone();
+    show.line(&format!("{}: {} primitives", args.scene.scene, model.primitives()));
+    let prepared = Prepared::new(model, &args.tree.settings())?;
+    let wanted = Settings { size: args.size, spp: args.spp, depth: args.depth, seed: args.seed, ..Settings::default() };
+    let frame = prepared.frame(&camera, &wanted);
+    check_camera(&frame)?;
+    let pages = prepared.packed.open()?;
+    let scene = prepared.scene(&pages);
+
+    let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
+    experiment.dispatcher = match args.dispatcher {
+        Where::Host => HOST,
+        Where::Node => 1,
+    };
+    experiment.options = Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) };
+    let mut report =
+        Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
+    experiment.memory = args.memory;
+    for (policy, &nodes) in policies.iter().flat_map(|policy| args.nodes.iter().map(move |nodes| (policy, nodes))) {
+        experiment.settings = args.machine.settings(*policy);
+        show.line(&format!("{}, {} with {nodes} node{}", args.machine.name, name_of(*policy), if nodes == 1 { "" } else { "s" }));
+        show.begin();
+        let run = experiment.run(nodes, &mut |progress| {
+            show.progress(progress);
+            !interrupted.load(Ordering::Relaxed)
+        })?;
+        show.end();
+        let Some(run) = run else {
+            show.line("interrupted: nothing is written");
+            return Ok(End::Interrupted);
+        };
+        report.runs.push(run);
+    }
+
+    if !outputs.iter().any(to_standard_output) {
+        std::io::stdout().write_all(table(&report.runs).as_bytes())?;
+    }
+    if let Some(json) = json {
+        json.write_text(&format!("{}\n", report.to_json()))?;
+    }
+    if let Some(csv) = csv {
+        csv.write_text(&csv::runs(&report))?;
+    }
+    if let Some(html) = html {
+        html.write_text(&html::page(&report))?;
+    }
+    Ok(End::Done)
+}
+
+fn table(runs: &[Run]) -> String {
+    let mut table = format!(
+        "{:<13}  {:>5}  {:>12}  {:>8}  {:>10}  {:>6}  {:>10}  {:>9}  {:<16}\n",
+        "scheduler", "nodes", "seconds", "speed-up", "efficiency", "busy", "messages", "MB", "film"
+    );
+    for run in runs {
+        table += &format!(
+            "{:<13}  {:>5}  {:>12.6}  {:>8.2}  {:>8.1} %  {:>4.0} %  {:>10}  {:>9.3}  {:<16}\n",
+            run.scheduler,
+            run.nodes,
+            run.seconds,
+            run.speedup,
+            100.0 * run.efficiency,
+            100.0 * run.busy,
+            run.messages,
+            run.bytes as f64 * 1e-6,
+            run.film
+        );
+    }
+    table
+}

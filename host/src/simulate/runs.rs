@@ -1,0 +1,220 @@
+//! From a simulated farm to its record.
+//!
+//! A run's speed-up is over the run of one node of the same machine, with the same dispatcher and costs; that run is
+//! made once for all the others.
+
+use super::record::{NodeRun, QueueRun, Rays, Run};
+use crate::partition::{Misfit, owners};
+use crate::prepare::Prepared;
+use hybray_link::Peer;
+use hybray_scheduler::policy::Policy;
+use hybray_scheduler::{Options, Outcome, Plan, Progress, Settings, Sizes};
+use hybray_simulated::{Budget, Farm, Machine, SimulateError, Simulated, simulate};
+use hybray_tracer::Scene;
+use hybray_wire::{Counts, Frame};
+
+/// The same picture on one machine, for any number of nodes.
+pub struct Experiment<'a> {
+    /// What is drawn.
+    pub prepared: &'a Prepared,
+    /// Its pages, opened.
+    pub scene: &'a Scene<'a>,
+    /// How.
+    pub frame: &'a Frame,
+    /// What everything costs.
+    pub machine: &'a Machine,
+    /// Who gives out tiles: the host or node 1.
+    pub dispatcher: Peer,
+    /// How.
+    pub options: Options,
+    /// How nodes work.
+    pub settings: Settings,
+    /// What each node has, bytes; everything if it is not given.
+    pub memory: Option<u64>,
+    /// The run of one node, when it has been made.
+    alone: Option<Simulated>,
+    pages: Vec<&'a [u8]>,
+}
+
+/// The scheduler of that name.
+#[must_use]
+pub fn scheduler(name: &str) -> Option<Policy> {
+    Policy::ALL.iter().find(|(known, _)| *known == name).map(|&(_, policy)| policy)
+}
+
+/// The name of a scheduler.
+#[must_use]
+pub fn name_of(policy: Policy) -> &'static str {
+    Policy::ALL.iter().find(|&&(_, known)| known == policy).map_or("", |&(name, _)| name)
+}
+
+impl<'a> Experiment<'a> {
+    /// Nothing has been run yet.
+    #[must_use]
+    pub fn new(prepared: &'a Prepared, scene: &'a Scene<'a>, frame: &'a Frame, machine: &'a Machine) -> Self {
+        Self {
+            prepared,
+            scene,
+            frame,
+            machine,
+            dispatcher: hybray_link::HOST,
+            options: Options::default(),
+            settings: machine.settings(Policy::default()),
+            memory: None,
+            alone: None,
+            pages: prepared.packed.page_slices(),
+        }
+    }
+
+    /// Who owns which page, if each of so many nodes has `memory`.
+    ///
+    /// # Errors
+    /// If they do not fit: what would do.
+    pub fn owners(&self, nodes: Peer, memory: u64) -> Result<Vec<u16>, RunError> {
+        let packed = &self.prepared.packed;
+        let plan = Plan::new(Sizes::of(self.scene), nodes, memory, None, self.settings.policy).map_err(SimulateError::Plan)?;
+        Ok(owners(&packed.placed_pages(), packed.voxels(), nodes, plan.owned_bytes_max())?)
+    }
+
+    /// Draws it on so many nodes. `watch` is called often; the picture ends as it is when it returns false.
+    ///
+    /// # Errors
+    /// See [`simulate`].
+    pub fn simulated(&self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Simulated, RunError> {
+        let Self { machine, dispatcher, options, settings, .. } = *self;
+        // The one-node run has unlimited memory (DESIGN section 12).
+        let memory = self.memory.filter(|_| nodes > 1);
+        let owners = memory.map(|memory| self.owners(nodes, memory)).transpose()?;
+        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget { memory, owners });
+        let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
+        Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
+    }
+
+    /// The record of so many nodes, after that of one if it was not made yet; nothing if `watch` has ended a picture.
+    ///
+    /// # Errors
+    /// See [`simulate`]; and when a picture ends unfinished for any other reason.
+    pub fn run(&mut self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Option<Run>, RunError> {
+        if self.alone.is_none() {
+            let Some(alone) = self.finished(1, watch)? else { return Ok(None) };
+            self.alone = Some(alone);
+        }
+        let many = if nodes == 1 { None } else { self.finished(nodes, watch)? };
+        let Some(alone) = &self.alone else { return Ok(None) };
+        match &many {
+            None if nodes != 1 => Ok(None),
+            many => Ok(Some(self.record(many.as_ref().unwrap_or(alone), alone.time_ns))),
+        }
+    }
+
+    fn finished(&self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Option<Simulated>, RunError> {
+        let run = self.simulated(nodes, watch)?;
+        match run.outcome {
+            Outcome::Finished => Ok(Some(run)),
+            Outcome::Stopped => Ok(None),
+            outcome => Err(RunError::Unfinished { nodes, outcome }),
+        }
+    }
+
+    fn record(&self, run: &Simulated, alone_ns: u64) -> Run {
+        let mut counts = Counts::default();
+        run.nodes.iter().for_each(|node| counts += node.report.counts);
+        let speedup = alone_ns as f64 / run.time_ns.max(1) as f64;
+        let packed = &self.prepared.packed;
+        let owners = self
+            .memory
+            .filter(|_| run.nodes.len() > 1)
+            .and_then(|memory| self.owners(run.nodes.len() as Peer, memory).ok());
+        let mut held = vec![(0u64, 0u64); run.nodes.len()];
+        for page in 0..packed.pages() as u32 {
+            let primitives = u64::from(packed.primitives_of(page));
+            let nodes = match &owners {
+                Some(owners) => usize::from(owners[page as usize]) - 1..usize::from(owners[page as usize]),
+                None => 0..run.nodes.len(),
+            };
+            for (count, pages) in &mut held[nodes] {
+                *count += primitives;
+                *pages += 1;
+            }
+        }
+        let fixed = run.plan.sum().total_bytes() - run.plan.lines as u64 * 64;
+        let memory = |node: &hybray_simulated::NodeRun| fixed + node.high_water.page_bytes;
+        let nodes = run.nodes.iter().zip(&held).map(|(node, &(primitives, pages))| NodeRun {
+            primitives,
+            pages,
+            tiles: u64::from(node.report.tiles),
+            demand_driven: rays(&node.report.counts).saturating_sub(node.exchange.arrived),
+            data_parallel: node.exchange.arrived,
+            forwarded: node.exchange.forwarded,
+            fetched_pages: node.exchange.fetched,
+            queues: queues(node),
+            busy_seconds: seconds(node.busy_ns.iter().sum()),
+            busy_intervals: (0..)
+                .zip(&node.busy_ns)
+                .map(|(interval, &busy)| {
+                    let length = run.interval_ns.min(run.time_ns - interval * run.interval_ns);
+                    busy as f32 / length.max(1) as f32
+                })
+                .collect(),
+            sent_messages: node.traffic.sent_frames,
+            sent_bytes: node.traffic.sent_bytes,
+            memory_high_water: memory(node),
+            ..NodeRun::default()
+        });
+        let forwarded = run.nodes.iter().map(|node| node.exchange.forwarded).sum();
+        Run {
+            nodes: run.nodes.len() as u32,
+            scheduler: name_of(self.settings.policy).to_owned(),
+            seconds: seconds(run.time_ns),
+            speedup,
+            efficiency: speedup / run.nodes.len() as f64,
+            busy: run.busy(),
+            loading_seconds: seconds(run.loading_ns),
+            gathering_seconds: seconds(run.gathering_ns),
+            messages: run.nodes.iter().map(|node| node.traffic.sent_frames).sum(),
+            bytes: run.nodes.iter().map(|node| node.traffic.sent_bytes).sum(),
+            memory_high_water: run.nodes.iter().map(memory).max().unwrap_or(0),
+            memory_limit: self.memory,
+            film: format!("{:016x}", run.film),
+            events: format!("{:016x}", run.events),
+            rays: Rays { primary: counts.primary, secondary: counts.secondary, shadow: counts.shadow, forwarded },
+            per_node: nodes.collect(),
+            interval_seconds: seconds(run.interval_ns),
+        }
+    }
+}
+
+/// Why there is no record.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RunError {
+    /// The simulator says so.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The pages do not fit.
+    #[error(transparent)]
+    Misfit(#[from] Misfit),
+    /// The machines say so, and that is a bug.
+    #[error("the picture on {nodes} nodes is not finished but {outcome:?}: please report this, with the scene")]
+    Unfinished {
+        /// How many nodes.
+        nodes: Peer,
+        /// What became of it.
+        outcome: Outcome,
+    },
+}
+
+fn seconds(nanoseconds: u64) -> f64 {
+    nanoseconds as f64 * 1e-9
+}
+
+fn rays(counts: &Counts) -> u64 {
+    counts.primary + counts.secondary + counts.shadow
+}
+
+fn queues(node: &hybray_simulated::NodeRun) -> Vec<QueueRun> {
+    let h = &node.high_water;
+    let all = [("rays", h.rays), ("partial sums", h.partials), ("tiles", h.tiles), ("page requests", h.requests)];
+    all.into_iter()
+        .map(|(name, (high, limit))| QueueRun { name: name.to_owned(), high_water: high as u64, limit: limit as u64 })
+        .collect()
+}

@@ -1,0 +1,213 @@
+//! Nodes on a virtual clock: the real machines trace the real scene, and a [`Machine`] says what that would take.
+//!
+//! Every participant takes in what has arrived, works, and sends, as `nodes/runner` has it; each of these takes as long
+//! as the machine model says for what was counted, and nothing that it sends is seen before. The pictures are those of
+//! any other farm, bit for bit; the times are the model's, in whole nanoseconds, and the same on every computer (DESIGN
+//! section 12). Nothing here reads a clock or starts a thread.
+#![forbid(unsafe_code)]
+
+mod machine;
+mod meter;
+mod schedule;
+mod take;
+mod turn;
+mod worker;
+mod world;
+
+pub use hybray_sim::{LinkCounts, LinkModel, NetworkModel, Topology, Traffic};
+pub use hybray_scheduler::Traffic as Exchange;
+pub use machine::{Costs, MACHINES, Machine, MessageCosts, Operations};
+
+use hybray_link::Peer;
+use hybray_scene::{Line, lines_for, parents};
+use hybray_scheduler::{
+    Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, Plan, PlanError, Progress, Settings, Sizes, TileState,
+    can_draw,
+};
+use hybray_tracer::Scene;
+use hybray_wire::{Frame, TileMap};
+
+/// Nodes at most.
+pub const NODES_MAX: Peer = 4096;
+
+/// What may be chosen about a simulated farm. None of it changes a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Farm<'a> {
+    /// What everything costs.
+    pub machine: &'a Machine,
+    /// Nodes, 1 to [`NODES_MAX`].
+    pub nodes: Peer,
+    /// Who gives out tiles: the host, or node 1 (POV||Ray, section 2.2).
+    pub dispatcher: Peer,
+    /// T, and the least run.
+    pub options: Options,
+    /// How nodes work.
+    pub settings: Settings,
+    /// What each node has, if not everything.
+    pub budget: Option<Budget<'a>>,
+}
+
+/// A node's memory, and where pages are to begin with.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget<'a> {
+    /// What each node has, bytes: everything that it works in.
+    pub memory: u64,
+    /// The node that owns each page.
+    pub owners: &'a [u16],
+}
+
+/// Why there is no result.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SimulateError {
+    /// Nodes cannot draw it.
+    #[error("the picture has no pixels, or too many: give --size, such as 640x480")]
+    NoPicture,
+    /// Nodes, or who gives out tiles.
+    #[error("a simulated farm has 1 to {NODES_MAX} nodes, and its dispatcher is the host (0) or node 1")]
+    NoFarm,
+    /// The budget is too small.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Nothing goes on. This is a bug, or a network that was cut.
+    #[error("stuck at {seconds} virtual seconds: {state}")]
+    Stuck {
+        /// Whole virtual seconds.
+        seconds: u64,
+        /// What everybody does.
+        state: String,
+    },
+}
+
+/// What a node did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NodeRun {
+    /// What it said itself: rays and tiles; its time is virtual.
+    pub report: NodeReport,
+    /// What was counted.
+    pub operations: Operations,
+    /// Time spent on that.
+    pub computing_ns: u64,
+    /// Time spent on sending and receiving, before, during and after the run.
+    pub messaging_ns: u64,
+    /// Time of either kind, by interval, from the first tile given out to the last one finished.
+    pub busy_ns: Vec<u64>,
+    /// Frames and bytes to and from others.
+    pub traffic: Traffic,
+    /// Rays and pages to and from others.
+    pub exchange: Exchange,
+    /// Most that was ever in use.
+    pub high_water: HighWater,
+}
+
+/// A picture, and what it took.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Hash of the accumulated picture.
+    pub film: u64,
+    /// Hash of all deliveries: equal for equal histories.
+    pub events: u64,
+    /// From the beginning to the first tile given out.
+    pub loading_ns: u64,
+    /// From then to the last operation on a tile, at the node that had it.
+    pub time_ns: u64,
+    /// From then until the film has everything; 0 if it never had.
+    pub gathering_ns: u64,
+    /// Length of the intervals of [`NodeRun::busy_ns`].
+    pub interval_ns: u64,
+    /// Each node, from node 1 on.
+    pub nodes: Vec<NodeRun>,
+    /// The host's frames and bytes.
+    pub host: Traffic,
+    /// Every directed physical link.
+    pub links: Vec<LinkCounts>,
+    /// Frames delivered.
+    pub frames: u64,
+    /// Frames that made no sense.
+    pub refused_frames: u64,
+    /// What every node is made of.
+    pub plan: Plan,
+}
+
+impl Simulated {
+    /// Busy over total time of all nodes (equation 6.2 of the 1995 report), 0 to 1.
+    #[must_use]
+    pub fn busy(&self) -> f64 {
+        let busy: u64 = self.nodes.iter().flat_map(|node| &node.busy_ns).sum();
+        busy as f64 / (self.time_ns as f64 * self.nodes.len() as f64).max(1.0)
+    }
+
+    /// What all nodes counted.
+    #[must_use]
+    pub fn operations(&self) -> Operations {
+        let mut all = Operations::default();
+        self.nodes.iter().for_each(|node| all += node.operations);
+        all
+    }
+}
+
+/// Draws `frame` on a simulated farm whose nodes all have `scene`. `watch` is called often with how far it is; the
+/// picture ends as it is when it returns false.
+///
+/// # Errors
+/// If there is no such picture or farm, or if nothing goes on any more.
+pub fn simulate(
+    scene: &Scene<'_>,
+    scene_hash: u64,
+    pages: &[&[u8]],
+    frame: &Frame,
+    farm: &Farm<'_>,
+    watch: &mut dyn FnMut(Progress) -> bool,
+) -> Result<Simulated, SimulateError> {
+    prepared(scene, scene_hash, pages, frame, farm, &mut |_| {}, watch)
+}
+
+/// [`simulate`] on a network that `spoil` may do something to first.
+fn prepared(
+    scene: &Scene<'_>,
+    scene_hash: u64,
+    pages: &[&[u8]],
+    frame: &Frame,
+    farm: &Farm<'_>,
+    spoil: &mut dyn FnMut(&mut hybray_sim::Network),
+    watch: &mut dyn FnMut(Progress) -> bool,
+) -> Result<Simulated, SimulateError> {
+    let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame)).ok_or(SimulateError::NoPicture)?;
+    if !(1..=NODES_MAX).contains(&farm.nodes) || farm.dispatcher > 1 {
+        return Err(SimulateError::NoFarm);
+    }
+    let peers = usize::from(farm.nodes) + 1;
+    let mut sums = vec![[0; 3]; map.width() as usize * map.height() as usize];
+    let mut tiles = vec![TileState::default(); map.len() as usize];
+    let mut reports = vec![NodeReport::default(); peers];
+    let film = Film::new(frame, &mut sums, &mut tiles).ok_or(SimulateError::NoPicture)?;
+    let master = Master::new(*frame, film, &mut reports, scene_hash, farm.dispatcher);
+    let mut states = vec![NodeState::default(); peers];
+    let mut entries = scene.resident.directory.entries.to_vec();
+    let mut scene = *scene;
+    let mut plan = Plan::without_budget(Sizes::of(&scene));
+    if let Some(budget) = &farm.budget {
+        let mut owned = vec![0; peers];
+        for (entry, &owner) in entries.iter_mut().zip(budget.owners) {
+            entry.owner = owner;
+            owned[usize::from(owner)] += (lines_for(entry.bytes as usize) * size_of::<Line>()) as u64;
+        }
+        let owned_max = owned.into_iter().max();
+        plan = Plan::new(Sizes::of(&scene), farm.nodes, budget.memory, owned_max, farm.settings.policy)?;
+    }
+    scene.resident.directory.entries = &entries;
+    let mut up = vec![0; scene.resident.directory.nodes.len() + entries.len()];
+    parents(scene.resident.directory.nodes, &mut up);
+    let (settings, dispatcher) = (farm.settings, farm.dispatcher);
+    let shared = worker::Shared { scene, scene_hash, up: &up, pages, plan, settings, dispatcher };
+    let mut memories: Vec<worker::Memory> = (1..peers).map(|_| worker::memory(&plan)).collect();
+    let workers =
+        (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
+    let mut world = world::World::new(farm, plan, master, &mut states, workers);
+    spoil(world.network());
+    world.run(watch)
+}
+
+#[cfg(test)]
+mod tests;

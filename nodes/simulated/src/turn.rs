@@ -1,0 +1,73 @@
+//! A participant's turn at sending: what each frame costs, and when it leaves.
+
+use crate::machine::Machine;
+use crate::worker::{records, timed};
+use hybray_link::{Event, Link, Peer};
+use hybray_sim::Network;
+use hybray_wire::{Message, decode, encode};
+
+/// What was said in a turn.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Said {
+    /// Time that it took, picoseconds.
+    pub spent_ps: u64,
+    /// Frames.
+    pub frames: u32,
+    /// When the first run of tiles left.
+    pub first_tiles_ns: Option<u64>,
+}
+
+/// The link of a participant that sends: frames leave one after the other, each when it is packed.
+pub(crate) struct Turn<'a> {
+    pub network: &'a mut Network,
+    pub machine: &'a Machine,
+    pub me: Peer,
+    pub now_ns: u64,
+    /// Time spent on the run that ends next, and on everything.
+    pub run_ns: &'a mut u64,
+    pub computing_ns: u64,
+    pub said: Said,
+}
+
+/// What a frame costs its sender or its receiver beside the fixed part, picoseconds.
+pub(crate) fn contents_ps(machine: &Machine, message: Option<&Message>, bytes: usize) -> u64 {
+    machine.messages.byte * bytes as u64 + machine.messages.record * message.map_or(0, records)
+}
+
+impl Link for Turn<'_> {
+    fn me(&self) -> Peer {
+        self.me
+    }
+
+    fn peers(&self) -> Peer {
+        self.network.peers()
+    }
+
+    fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
+        let Self { network, machine, me, now_ns, run_ns, computing_ns, said } = self;
+        network.send(*me, to, *now_ns, bytes_max, &mut |room| {
+            let mut used = write(room);
+            let message = decode(&room[..used]).ok().map(|view| view.message);
+            if let Some(message @ (Message::Done { .. } | Message::Report { .. })) = message {
+                let message = timed(message, run_ns, *computing_ns);
+                used = encode(&message, room, |_| {}).expect("the room for a message is enough for any");
+            }
+            // What one says to oneself is a call.
+            if to != *me {
+                said.spent_ps += machine.messages.sent + contents_ps(machine, message.as_ref(), used);
+            }
+            said.frames += 1;
+            let leaves_ns = *now_ns + said.spent_ps / 1000;
+            if let Some(Message::Tiles { .. }) = message {
+                said.first_tiles_ns.get_or_insert(leaves_ns);
+            }
+            (used, leaves_ns)
+        })
+    }
+
+    fn receive(&mut self, read: &mut dyn FnMut(Event<'_>)) -> bool {
+        self.network.receive(self.me, read)
+    }
+
+    fn wait(&mut self, _: u64) {}
+}
