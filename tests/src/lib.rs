@@ -4,9 +4,13 @@
 
 mod picture;
 mod rays;
+mod turns;
+mod within;
 
 pub use picture::{Picture, drawn, kernels, scene};
 pub use rays::{camera_rays, close_rays, random_ray, rays_at};
+pub use turns::{Post, Stranger, turns};
+pub use within::within;
 
 use hybray::build::Source;
 use hybray::model::{Mesh, Model, NamedMaterial, Sphere};

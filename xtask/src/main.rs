@@ -5,6 +5,8 @@ mod bench;
 mod ci;
 mod gate;
 mod nostd;
+mod papers;
+mod soak;
 mod test;
 mod tidy;
 mod tools;
@@ -31,6 +33,10 @@ enum Verb {
     Tidy,
     /// Build the core crates for a machine without an operating system
     Nostd,
+    /// Random schedules on the simulated farm, thousands of them; a seed that fails is printed
+    Soak(soak::Soak),
+    /// The papers' experiments on the simulator: writes the tables of docs/PAPERS.md
+    Papers(papers::Papers),
     /// Measure again what the project says of its speed and size
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -42,6 +48,8 @@ fn main() -> anyhow::Result<ExitCode> {
         Verb::Test => test::run(),
         Verb::Tidy => tidy::run(),
         Verb::Nostd => nostd::run(),
+        Verb::Soak(soak) => soak::run(&soak),
+        Verb::Papers(papers) => papers::run(&papers),
         Verb::Bench(bench) => bench::run(&bench),
     }
 }

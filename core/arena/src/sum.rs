@@ -17,6 +17,8 @@ pub struct Term {
     pub bytes: u64,
     /// Values in it.
     pub count: u64,
+    /// Bytes of one value.
+    pub bytes_each: u64,
 }
 
 /// The terms that an [`Arena`](crate::Arena) is going to be asked for.
@@ -37,7 +39,7 @@ impl Sum {
     /// A sum of nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { terms: [Term { name: "", bytes: 0, count: 0 }; TERMS_MAX], len: 0 }
+        Self { terms: [Term { name: "", bytes: 0, count: 0, bytes_each: 0 }; TERMS_MAX], len: 0 }
     }
 
     /// Adds a slice of `count` values.
@@ -46,7 +48,8 @@ impl Sum {
     /// If there are [`TERMS_MAX`] terms already: how many there are is a matter of code, not of input.
     pub fn add<T>(&mut self, term: &'static str, count: usize) {
         assert!(self.len < TERMS_MAX, "a sum has at most {TERMS_MAX} terms: no room for {term}");
-        self.terms[self.len] = Term { name: term, bytes: bytes_of::<T>(count), count: count as u64 };
+        self.terms[self.len] =
+            Term { name: term, bytes: bytes_of::<T>(count), count: count as u64, bytes_each: size_of::<T>() as u64 };
         self.len += 1;
     }
 

@@ -215,7 +215,8 @@ proptest! {
         let total = sum.total_bytes() as usize;
         prop_assert_eq!(total, terms.iter().map(bytes_by_hand).sum::<usize>());
         for ((asked, name), term) in terms.iter().zip(NAMES.iter().cycle()).zip(sum.terms()) {
-            let expected = Term { name, bytes: bytes_by_hand(asked) as u64, count: asked.count as u64 };
+            let (bytes, count) = (bytes_by_hand(asked) as u64, asked.count as u64);
+            let expected = Term { name, bytes, count, bytes_each: KINDS[asked.kind].bytes as u64 };
             prop_assert_eq!(*term, expected);
         }
         check_suffices(&terms, total, 0, total);

@@ -6,7 +6,7 @@
 //! only, with a probability of 2^-64 for each entry; a lost or repeated entry leaves it off zero.
 
 /// What is still owed for a tile.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Balance(u64);
 
 impl Balance {

@@ -14,6 +14,8 @@ mod master;
 mod node;
 mod plan;
 pub mod policy;
+pub mod rules;
+mod server;
 
 pub use chunk::{Shares, chunk};
 pub use dispatcher::{Dispatcher, NodeState, Options};
@@ -26,6 +28,7 @@ pub use node::{
 };
 
 pub use plan::{Plan, PlanError, Sizes};
+pub use server::{Asked, PageServer};
 
 use hybray_link::{Link, Peer};
 use hybray_wire::{HEAD_BYTES_MAX, Message, encode};

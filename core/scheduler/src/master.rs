@@ -38,6 +38,11 @@ pub enum Outcome {
     },
     /// Every node is lost.
     Abandoned,
+    /// The node that had this page is lost, and the host does not have it.
+    Missing {
+        /// Its number.
+        page: u32,
+    },
 }
 
 /// What a node did, in its own words.
@@ -136,6 +141,11 @@ impl<'m> Master<'m> {
     /// Ends the picture as it is.
     pub fn stop(&mut self) {
         self.end(Outcome::Stopped);
+    }
+
+    /// A page was asked for at the host, which does not have it: some rays can never end.
+    pub fn missing(&mut self, page: u32) {
+        self.end(Outcome::Missing { page });
     }
 
     fn end(&mut self, outcome: Outcome) {

@@ -88,6 +88,24 @@ const TILES: (u64, u64, u64) = (64, 8, 256);
 const RAYS: (u64, u64, u64) = (16, 256, 16_384);
 const PARTIALS: (u64, u64, u64) = (64, 64, 4_096);
 
+/// Bytes of pages that a node owns at most where shares are even: one page more than the mean.
+fn even_share(sizes: &Sizes, nodes: u16) -> u64 {
+    (sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64).min(sizes.pages_bytes)
+}
+
+/// The first number from `from` on for which `enough` asks no more than it; `None` if `enough` has none, or there is no end
+/// of it. `enough` must not fall as its argument grows.
+fn first_fixed(from: u64, enough: impl Fn(&u64) -> Option<u64>) -> Option<u64> {
+    let mut at = from;
+    for _ in 0..1000 {
+        match enough(&at)? {
+            more if more > at => at = more,
+            _ => return Some(at),
+        }
+    }
+    None
+}
+
 /// What a node is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -117,39 +135,28 @@ impl Plan {
         owned_max: Option<u64>,
         policy: Policy,
     ) -> Result<Self, PlanError> {
-        let share = |(part, least, most): (u64, u64, u64), size: usize| {
-            (memory / part / size as u64).clamp(least, most) as usize
-        };
-        let limits = Limits {
-            peers: usize::from(nodes) + 1,
-            pages: sizes.pages,
-            rays: share(RAYS, 92),
-            tiles: share(TILES, 1608),
-            partials: share(PARTIALS, 44),
-        };
-        let mut plan = Self { sizes, limits, places: PLACES_MIN, lines: 0, holds_all: false };
+        let mut plan = Self::least(sizes, nodes, memory);
         let place_lines = lines_for(sizes.page_bytes_max);
         let line = size_of::<Line>() as u64;
-        let least = plan.sum().total_bytes() + (PLACES_MIN * place_lines) as u64 * line;
-        // An uneven share is at most one page more than an even one.
-        let even = sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64;
-        let owned = owned_max.unwrap_or(even.min(sizes.pages_bytes));
-        if memory < least {
-            return Err(PlanError::Memory { memory, nodes, needed: least + owned });
-        }
-        let room = memory - least;
-        if room < owned {
-            let total = sizes.pages_bytes;
-            let spare = room.saturating_sub(sizes.page_bytes_max as u64);
-            return Err(PlanError::Pages {
-                pages: total,
-                room: room * u64::from(nodes),
-                memory,
-                nodes,
-                nodes_needed: if spare == 0 { 0 } else { total.div_ceil(spare) },
-                // The shares grow with the budget.
-                needed: least + owned + owned / 4,
-            });
+        let least = plan.least_bytes();
+        let owned = owned_max.unwrap_or(even_share(&sizes, nodes));
+        let room = memory.saturating_sub(least);
+        if memory < least || room < owned {
+            // The shares grow with the budget, but slower: the first that is enough is met from below.
+            let enough = |memory: &u64| Some(Self::least(sizes, nodes, *memory).least_bytes() + owned);
+            let needed = first_fixed(memory, enough).unwrap_or(u64::MAX);
+            if memory < least {
+                return Err(PlanError::Memory { memory, nodes, needed });
+            }
+            // Likewise what is known of peers grows with the nodes.
+            let enough = |nodes: &u64| {
+                let nodes = u16::try_from(*nodes).ok().filter(|&nodes| nodes < u16::MAX)?;
+                let room = memory.checked_sub(Self::least(sizes, nodes, memory).least_bytes())?;
+                Some(sizes.pages_bytes / (room.checked_sub(sizes.page_bytes_max as u64)? + 1) + 1)
+            };
+            let nodes_needed = first_fixed(u64::from(nodes), enough).unwrap_or(0);
+            let (pages, room) = (sizes.pages_bytes, room * u64::from(nodes));
+            return Err(PlanError::Pages { pages, room, memory, nodes, nodes_needed, needed });
         }
         let keeps_others = matches!(policy, Policy::Hybrid | Policy::DemandDriven);
         plan.holds_all = keeps_others && room >= sizes.pages_bytes;
@@ -164,6 +171,42 @@ impl Plan {
             plan.lines = plan.places * place_lines + (owned / line) as usize;
         }
         Ok(plan)
+    }
+
+    /// What every node of so many must have if each has `memory` bytes, without room for the pages that stay.
+    fn least(sizes: Sizes, nodes: u16, memory: u64) -> Self {
+        let share = |(part, least, most): (u64, u64, u64), size: usize| {
+            (memory / part / size as u64).clamp(least, most) as usize
+        };
+        let limits = Limits {
+            peers: usize::from(nodes) + 1,
+            pages: sizes.pages,
+            rays: share(RAYS, 92),
+            tiles: share(TILES, 1608),
+            partials: share(PARTIALS, 44),
+        };
+        let lines = PLACES_MIN * lines_for(sizes.page_bytes_max);
+        Self { sizes, limits, places: PLACES_MIN, lines, holds_all: false }
+    }
+
+    fn least_bytes(&self) -> u64 {
+        self.sum().total_bytes()
+    }
+
+    /// The same with no more than `bytes` for pages: what the node owns, at most `owned_max`, and the least of a cache stay,
+    /// whatever they take. For experiments on scenes that are larger than their nodes.
+    #[must_use]
+    pub fn with_page_memory(mut self, bytes: u64, nodes: u16, owned_max: Option<u64>) -> Self {
+        let line = size_of::<Line>() as u64;
+        if self.lines as u64 * line > bytes {
+            let owned = owned_max.unwrap_or(even_share(&self.sizes, nodes));
+            let place_lines = lines_for(self.sizes.page_bytes_max);
+            let places = bytes.saturating_sub(owned) / (place_lines as u64 * line);
+            self.places = (places as usize).clamp(PLACES_MIN, self.sizes.pages + PLACES_MIN);
+            self.lines = self.places * place_lines + (owned / line) as usize;
+            self.holds_all = false;
+        }
+        self
     }
 
     /// A node without a budget: it has every page, and no ray ever waits.

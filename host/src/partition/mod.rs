@@ -3,10 +3,12 @@
 //! Pure functions: nothing here holds pages, opens files, or knows what a node is doing. Lengths are in the scene's
 //! internal unit, memory in bytes.
 
+mod budget;
 mod owners;
 mod replicas;
 mod voxels;
 
+pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
 pub use owners::{Misfit, PlacedPage, owners};
 pub use replicas::replicas;
 pub use voxels::{Plan, Step, VOXELS_MAX, Voxels};

@@ -2,11 +2,15 @@
 
 use crate::build::{Rule, Settings};
 use crate::partition::Voxels;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
 use hybray_scene::PAGE_BYTES_MAX;
+use hybray_scheduler::Settings as NodeSettings;
+use hybray_scheduler::policy::Policy;
 use hybray_simulated::{MACHINES, Machine, NODES_MAX};
+use hybray_wire::{BODY_BYTES_MAX, RayRecord};
 use std::path::PathBuf;
 
 /// Ray-trace scenes that do not fit in any one machine, on machines of any size
@@ -21,6 +25,8 @@ pub(super) struct Cli {
 pub(super) enum Verb {
     /// Render a scene to a picture
     Render(RenderArgs),
+    /// Say what each node's memory would be spent on, term by term, before anything is drawn
+    Plan(PlanArgs),
     /// Render a scene on a virtual machine, and say how long that machine would take
     Simulate(SimulateArgs),
     /// Say what a scene holds and what it takes
@@ -59,9 +65,10 @@ pub(super) struct TreeArgs {
     /// Objects in a cell that the midpoint rule does not split
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Tree")]
     pub cell_objects: u32,
-    /// Most bytes of a page
-    #[arg(long, default_value_t = PAGE_BYTES_MAX as u32, value_parser = clap::value_parser!(u32).range(4096..=65536), help_heading = "Tree")]
-    pub page_bytes: u32,
+    /// Most bytes of a page, 4096 to 65536. Default: 65536; for nodes with a budget the largest of 64, 32, 16, 8 and 4 KiB
+    /// of which a node has room for 32
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4096..=65536), help_heading = "Tree")]
+    pub page_bytes: Option<u32>,
     /// Cut the scene into voxels: a grid, such as 4x8x1, or so many of equal work, such as 32. The picture does not
     /// depend on it
     #[arg(long, value_name = "N|WxHxD", help_heading = "Tree")]
@@ -69,16 +76,56 @@ pub(super) struct TreeArgs {
 }
 
 impl TreeArgs {
+    /// What was asked for.
     pub fn settings(&self) -> Settings {
+        self.settings_with(PAGE_BYTES_MAX as u32)
+    }
+
+    /// The same, with pages of `page_bytes` at most if nobody said how large they may be.
+    pub fn settings_with(&self, page_bytes: u32) -> Settings {
         let rule = match self.tree {
             Tree::Sah => Rule::SurfaceArea,
             Tree::Midpoint => {
                 Rule::Midpoint(midpoint::Settings { depth_max: self.cell_depth, objects_max: self.cell_objects })
             }
         };
-        Settings { rule, page_bytes: self.page_bytes as usize, voxels: self.voxels.unwrap_or_default() }
+        let page_bytes = self.page_bytes.unwrap_or(page_bytes) as usize;
+        Settings { rule, page_bytes, voxels: self.voxels.unwrap_or_default() }
     }
 }
+
+/// How nodes with a budget work. None of it changes a picture.
+#[derive(Debug, Args)]
+pub(super) struct WorkArgs {
+    /// Rays in a message at most, 1 to 186 (the 1995 report's granularity, table 6.1). Default: 100
+    #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u16).range(1..=GRANULARITY_MAX), help_heading = BUDGET)]
+    pub granularity: Option<u16>,
+    /// A node begins no new tile while so many rays wait in it (table 6.1: pixels in the system). Default: 4096, or half
+    /// of what the node has room for
+    #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
+    pub in_system: Option<u32>,
+    /// Side in pixels of a pyramid of primary rays: 8 or 16 (table 6.1). Default: 16
+    #[arg(long, value_name = "PIXELS", value_parser = PossibleValuesParser::new(["8", "16"]).map(|side| if side == "8" { 8u8 } else { 16 }), help_heading = BUDGET)]
+    pub pyramid: Option<u8>,
+}
+
+impl WorkArgs {
+    /// `settings` with what was asked for.
+    pub fn settings(&self, settings: NodeSettings) -> NodeSettings {
+        NodeSettings {
+            granularity: self.granularity.unwrap_or(settings.granularity),
+            in_system: self.in_system.unwrap_or(settings.in_system),
+            bundle_tiles: self.pyramid.map_or(settings.bundle_tiles, |side| if side == 8 { 1 } else { 4 }),
+            ..settings
+        }
+    }
+}
+
+/// Rays that a message has room for.
+const GRANULARITY_MAX: i64 = (BODY_BYTES_MAX / size_of::<RayRecord>()) as i64;
+const _: () = assert!(GRANULARITY_MAX == 186, "help and documents say 186");
+
+const BUDGET: &str = "Nodes with a budget (none of these changes the picture)";
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Tree {
@@ -160,6 +207,35 @@ pub(super) struct RenderArgs {
     /// Which kernels to run. `HYBRAY_KERNELS` gives the default
     #[arg(long, value_enum, env = "HYBRAY_KERNELS", default_value_t = KernelChoice::Auto, help_heading = "Farm (none of these changes the picture)")]
     pub kernels: KernelChoice,
+    /// Memory of each node, such as 32MiB: everything that it works in, and its part of the scene. Without it the nodes are
+    /// threads that share the whole scene
+    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = BUDGET)]
+    pub memory: Option<u64>,
+    /// Whether rays go to pages or pages to rays. Default: hybrid
+    #[arg(long, value_name = "NAME", value_parser = scheduler(), help_heading = BUDGET)]
+    pub scheduler: Option<Policy>,
+    #[command(flatten)]
+    pub work: WorkArgs,
+    #[command(flatten)]
+    pub tree: TreeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Nodes, 1 to 4096
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(NODES_MAX)))]
+    pub nodes: u16,
+    /// Memory of each node, such as 32MiB
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory: u64,
+    /// Whether rays go to pages or pages to rays
+    #[arg(long, value_name = "NAME", default_value = "hybrid", value_parser = scheduler())]
+    pub scheduler: Policy,
+    /// Write the plan in JSON to this file, or to standard output (`-`) instead of the table
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
     #[command(flatten)]
     pub tree: TreeArgs,
 }
@@ -176,18 +252,21 @@ pub(super) enum Where {
 pub(super) struct SimulateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// The machine: powerxplorer, cc48, gigabit, infiniband, serial-115200 or threads
-    #[arg(long, value_name = "NAME", value_parser = machine)]
+    /// The machine
+    #[arg(long, value_name = "NAME", value_parser = machine())]
     pub machine: &'static Machine,
     /// Numbers of nodes, 1 to 4096 each, such as 1,2,4,8
     #[arg(long, value_name = "N,..", value_delimiter = ',', required = true, value_parser = clap::value_parser!(u16).range(1..=i64::from(NODES_MAX)))]
     pub nodes: Vec<u16>,
-    /// How work is scheduled: hybrid, hybrid-1995, data-parallel, demand-driven; several are run one after the other
-    #[arg(long, value_name = "NAME,..", value_delimiter = ',', default_value = "hybrid")]
-    pub scheduler: Vec<String>,
-    /// Memory of each node, such as 32MiB: everything that it works in. Without it each node has the whole scene
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    /// Memory of each node, such as 32MiB: everything that it works in, and its part of the scene. Without it, and on one
+    /// node alone, each has the whole scene
+    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = BUDGET)]
     pub memory: Option<u64>,
+    /// Whether rays go to pages or pages to rays; several are run one after the other
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', default_value = "hybrid", value_parser = scheduler(), help_heading = BUDGET)]
+    pub scheduler: Vec<Policy>,
+    #[command(flatten)]
+    pub work: WorkArgs,
     /// Columns and rows, pixels
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
@@ -295,9 +374,24 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-fn machine(text: &str) -> Result<&'static Machine, String> {
-    let names = || MACHINES.map(|machine| machine.name).join(", ");
-    Machine::named(text).ok_or_else(|| format!("there is no such machine; there are {}", names()))
+fn machine() -> impl TypedValueParser<Value = &'static Machine> {
+    let values = MACHINES.iter().map(|machine| PossibleValue::new(machine.name).help(machine.about));
+    PossibleValuesParser::new(values).map(|name| Machine::named(&name).expect("one of those that there are"))
+}
+
+fn scheduler() -> impl TypedValueParser<Value = Policy> {
+    let values = Policy::ALL.map(|(name, policy)| {
+        PossibleValue::new(name).help(match policy {
+            Policy::Hybrid => "whichever costs less by what is known",
+            Policy::Hybrid1995 => "pages come to primary rays, all others go to their pages (the 1995 report)",
+            Policy::DataParallel => "rays go to the node that has their page",
+            Policy::DemandDriven => "pages come to the node that has their rays (POV||Ray)",
+        })
+    });
+    PossibleValuesParser::new(values).map(|name| {
+        let named = Policy::ALL.into_iter().find(|&(known, _)| known == name);
+        named.map_or_else(Policy::default, |(_, policy)| policy)
+    })
 }
 
 /// Bytes, with a unit: 32MiB, 512KiB, 1GiB, or a plain number.

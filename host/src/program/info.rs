@@ -5,10 +5,11 @@ use super::report::peak_bytes;
 use super::{End, prepare};
 use crate::builtin;
 use anyhow::Result;
+use hybray_scene::PAGE_BYTES_MAX;
 use std::io::Write;
 
 pub(super) fn run(args: &InfoArgs) -> Result<End> {
-    let (prepared, import_time) = prepare(&args.scene, &args.tree.settings())?;
+    let (prepared, import_time) = prepare(&args.scene, &args.tree, None, PAGE_BYTES_MAX as u32)?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     let nodes = scene.resident.pages.iter().map(|p| p.nodes.len()).sum::<usize>();

@@ -4,9 +4,11 @@
 //! arguments, 130 interrupted.
 
 mod args;
+mod budget;
 mod convert;
 mod info;
 mod pack;
+mod plan;
 mod render;
 mod report;
 mod show;
@@ -14,7 +16,7 @@ mod simulate;
 mod trace;
 
 use anyhow::{Context, Result, anyhow, bail};
-use args::{Cli, SceneArgs, Verb};
+use args::{Cli, SceneArgs, TreeArgs, Verb};
 use clap::{CommandFactory, Parser};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -38,6 +40,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let end = match cli.verb {
         Verb::Render(args) => render::run(&args),
+        Verb::Plan(args) => plan::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Info(args) => info::run(&args),
         Verb::Pack(args) => pack::run(&args),
@@ -118,15 +121,16 @@ fn load(args: &SceneArgs, size: Option<[u32; 2]>) -> Result<(Model, Duration)> {
     Ok((model, start.elapsed()))
 }
 
-/// Reads a scene and builds it with `settings`, or opens it if it is packed; and how long the reading took.
-fn prepare(args: &SceneArgs, settings: &build::Settings) -> Result<(Prepared, Duration)> {
+/// Reads a scene and builds it, or opens it if it is packed; and how long the reading took. `size` is that of the picture,
+/// if it is known; pages have `page_bytes` at most unless the arguments say otherwise.
+fn prepare(args: &SceneArgs, tree: &TreeArgs, size: Option<[u32; 2]>, page_bytes: u32) -> Result<(Prepared, Duration)> {
     if !is_packed(&args.scene) {
-        let (model, import_time) = load(args, None)?;
-        return Ok((Prepared::new(model, settings)?, import_time));
+        let (model, import_time) = load(args, size)?;
+        return Ok((Prepared::new(model, &tree.settings_with(page_bytes))?, import_time));
     }
     let start = Instant::now();
     let mut prepared = Prepared::open(Path::new(&args.scene))?;
-    if *settings != build::Settings::default() {
+    if tree.settings() != build::Settings::default() {
         prepared.warnings.push(format!("{} is packed already: settings of the tree are not used", args.scene));
     }
     Ok((prepared, start.elapsed()))

@@ -1,16 +1,23 @@
 //! `hybray render`.
 
 use super::args::{RenderArgs, Where};
-use super::report::{Counts, Memory, Node, Rays, Report, ReportFile, Seconds, peak_bytes};
+use super::budget::{Farm as BudgetFarm, size};
+use super::report::{
+    Budget, Counts, Exchange, Memory, Node, PlanReport, Rays, Report, ReportFile, Seconds, peak_bytes,
+};
 use super::show::{Show, rays_per_second};
 use super::{End, camera, load, prepare};
 use crate::model::Settings;
 use crate::pack::is_packed;
+use crate::partition::{Fit, page_bytes_for};
 use crate::picture::{Format, Output, Picture};
 use crate::prepare::Prepared;
+use crate::simulate::runs::name_of;
 use anyhow::{Context, Result, anyhow, bail};
-use hybray_native::{DispatcherAt, Farm, Traced, trace};
-use hybray_scheduler::{Options, Outcome};
+use hybray_native::{DispatcherAt, Farm, NODES_MAX, Traced, Worked, trace, trace_within};
+use hybray_scene::PAGE_BYTES_MAX;
+use hybray_scheduler::policy::Policy;
+use hybray_scheduler::{NodeReport, Options, Outcome, Settings as NodeSettings, Sizes};
 use hybray_shading::Camera;
 use hybray_wire::Frame;
 use std::path::{Path, PathBuf};
@@ -21,6 +28,7 @@ use std::time::{Duration, Instant};
 pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let start = Instant::now();
     let interrupted = interrupts()?;
+    check_budget(args)?;
     // What could go wrong at the end is tried at the beginning.
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene));
     let output = Output::create(&path, Format::of(&path, args.bits == "16")?)?;
@@ -34,8 +42,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
         show.line(&format!("{}: {primitives} primitives", args.scene.scene));
     };
-    let (mut prepared, import_time) = if is_packed(&args.scene.scene) {
-        let opened = prepare(&args.scene, &args.tree.settings())?;
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
+    let nodes = args.nodes.unwrap_or(cores);
+    let page_bytes = args.memory.map_or(PAGE_BYTES_MAX as u32, |memory| page_bytes_for(memory, nodes));
+    let packed = is_packed(&args.scene.scene);
+    let (mut prepared, import_time) = if packed {
+        let opened = prepare(&args.scene, &args.tree, args.size, page_bytes)?;
         say(&opened.0.warnings, opened.0.primitives.iter().sum());
         opened
     } else {
@@ -45,7 +57,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         if interrupted.load(Ordering::Relaxed) {
             return stopped_early(&show);
         }
-        (Prepared::new(model, &args.tree.settings())?, import_time)
+        (Prepared::new(model, &args.tree.settings_with(page_bytes))?, import_time)
     };
     let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
     if interrupted.load(Ordering::Relaxed) {
@@ -63,9 +75,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let frame = prepared.frame(&camera, &wanted);
     check_camera(&frame)?;
     let exposure = prepared.exposure(&wanted);
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
     let farm = Farm {
-        nodes: args.nodes.unwrap_or(cores),
+        nodes,
         kernels: args.kernels.kernels(),
         dispatcher: match args.dispatcher {
             Where::Host => DispatcherAt::Host,
@@ -76,20 +87,50 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
 
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
+    let policy = args.scheduler.unwrap_or_default();
+    let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
+    let mut fit = None;
+    if let Some(memory) = args.memory {
+        let farm = BudgetFarm { nodes, memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        let fit = fit.insert(farm.fit(&prepared, &scene)?);
+        show.line(&budget_line(fit, nodes, memory, policy));
+    }
     show.begin();
-    let mut traced = trace(&scene, prepared.hash, &frame, &farm, &mut |progress| {
+    let mut watch = |progress| {
         show.progress(progress);
         !interrupted.load(Ordering::Relaxed)
-    })
-    .context("the picture has no pixels, or too many: give --size, such as 640x480")?;
+    };
+    let traced = match args.memory.zip(fit.as_ref()) {
+        None => trace(&scene, prepared.hash, &frame, &farm, &mut watch),
+        Some((memory, fit)) => {
+            let pages = prepared.packed.page_slices();
+            let budget = hybray_native::Budget { memory, owners: &fit.owners, pages: &pages, settings };
+            trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?
+        }
+    };
+    let mut traced = traced.context("the picture has no pixels, or too many: give --size, such as 640x480")?;
     let trace_time = traced.time;
     show.end();
+    let budget = args.memory.zip(fit.as_ref()).map(|(memory, fit)| {
+        let settings = fit.plan.settings(settings);
+        Budget {
+            memory,
+            scheduler: name_of(settings.policy),
+            granularity: settings.granularity,
+            in_system: settings.in_system,
+            pyramid: if settings.bundle_tiles == 1 { 8 } else { 16 },
+            page_bytes_max: Sizes::of(&scene).page_bytes_max,
+            voxels: prepared.packed.voxels(),
+            plan: PlanReport::of(fit),
+        }
+    });
     drop(pages);
 
     match traced.outcome {
         Outcome::Finished | Outcome::Stopped => {}
         Outcome::Unbalanced { tile } => bail!("tile {tile} lost a ray twice: please report this, with the scene"),
         Outcome::Stranger { peer } => bail!("node {peer} has another scene or version"),
+        Outcome::Missing { page } => bail!("page {page} was lost with the node that had it: render again"),
         Outcome::Abandoned => bail!("every node was lost before the picture was finished"),
     }
     let film_warnings: Vec<_> = film_warnings(&traced).collect();
@@ -98,7 +139,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     output.write(&picture(&frame, std::mem::take(&mut traced.radiance)), exposure)?;
     let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
     if let Some(json) = json {
-        json.write(&report(args, &prepared, &frame, &farm, &traced, seconds))?;
+        let report = report(args, &prepared, &frame, &farm, &traced, seconds);
+        json.write(&Report { budget, nodes: nodes_of(&traced, fit.as_ref()), ..report })?;
     }
     film_warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
     show.line(&format!(
@@ -112,6 +154,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         import_time.as_secs_f64(),
         prepared.build_time.as_secs_f64(),
     ));
+    if let Some((memory, fit)) = args.memory.zip(fit.as_ref()) {
+        show.line(&traffic_line(&traced, fit, memory));
+    }
     if traced.outcome == Outcome::Stopped {
         let done = traced.progress;
         show.line(&format!("interrupted: {} of {} tiles are in {}", done.finished, done.tiles, path.display()));
@@ -119,6 +164,52 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     }
     show.line(&format!("{}", path.display()));
     Ok(End::Done)
+}
+
+/// What is about nodes with a budget wants one.
+fn check_budget(args: &RenderArgs) -> Result<()> {
+    let work = &args.work;
+    let given = [
+        ("--scheduler", args.scheduler.is_some()),
+        ("--granularity", work.granularity.is_some()),
+        ("--in-system", work.in_system.is_some()),
+        ("--pyramid", work.pyramid.is_some()),
+    ];
+    if let Some((name, _)) = given.iter().find(|(_, given)| *given && args.memory.is_none()) {
+        bail!("{name} is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB");
+    }
+    Ok(())
+}
+
+fn budget_line(fit: &Fit, nodes: u16, memory: u64, policy: Policy) -> String {
+    let has = match (fit.plan.holds_all, fit.plan.places) {
+        (true, _) => "with room for the whole scene".to_owned(),
+        (false, places) => format!("with its own pages and a cache of {places} more"),
+    };
+    let s = if nodes == 1 { "" } else { "s" };
+    format!("{nodes} node{s} of {}, {}, each {has}", size(memory), name_of(policy))
+}
+
+fn traffic_line(traced: &Traced, fit: &Fit, memory: u64) -> String {
+    let exchanges: Vec<_> =
+        traced.worked.iter().zip(&fit.owned_bytes).map(|(node, &owned)| Exchange::of(node, &fit.plan, owned)).collect();
+    let rays: u64 = exchanges.iter().map(|node| node.traffic.forwarded).sum();
+    let pages: u64 = exchanges.iter().map(|node| node.traffic.fetched).sum();
+    let high_water = exchanges.iter().map(|node| node.memory_high_water).max().unwrap_or(0);
+    format!("{rays} rays and {pages} pages went from node to node; none used more than {high_water} bytes of {memory}")
+}
+
+fn nodes_of(traced: &Traced, fit: Option<&Fit>) -> Vec<Node> {
+    let nodes = (1..).zip(traced.nodes.iter().zip(&traced.worked));
+    let node = |(node, (n, worked)): (usize, (&NodeReport, &Worked))| Node {
+        node,
+        tiles: n.tiles,
+        runs: n.runs,
+        rays: n.counts.primary + n.counts.secondary + n.counts.shadow,
+        busy_seconds: n.busy_nanoseconds as f64 * 1e-9,
+        exchange: fit.map(|fit| Exchange::of(worked, &fit.plan, fit.owned_bytes[node - 1])),
+    };
+    nodes.map(node).collect()
 }
 
 /// `spd:balls:4` becomes `spd-balls-4.png`, `models/cow.obj` becomes `cow.png`, in this folder.
@@ -226,17 +317,9 @@ fn report(
             peak_bytes,
             peak_bytes_per_primitive: peak_bytes.map(|peak| peak as f64 / primitives as f64),
         },
+        budget: None,
         kernels: farm.kernels.name(),
-        nodes: (1..)
-            .zip(&traced.nodes)
-            .map(|(node, n)| Node {
-                node,
-                tiles: n.tiles,
-                runs: n.runs,
-                rays: n.counts.primary + n.counts.secondary + n.counts.shadow,
-                busy_seconds: n.busy_nanoseconds as f64 * 1e-9,
-            })
-            .collect(),
+        nodes: Vec::new(),
         warnings: prepared.warnings.clone(),
     }
 }

@@ -1,7 +1,12 @@
 //! The JSON report of a picture: `docs/REPORT.md` describes it, and its fields are kept.
 
+use crate::partition::Fit;
 use crate::picture::pending::Pending;
+use crate::simulate::record::QueueRun;
 use anyhow::{Context, Result};
+use hybray_native::Worked;
+use hybray_scene::Line;
+use hybray_scheduler::{HighWater, Plan};
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -22,6 +27,9 @@ pub(super) struct Report {
     pub rays: Rays,
     pub counts: Counts,
     pub memory: Memory,
+    /// Of nodes with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
     /// Which kernels ran.
     pub kernels: &'static str,
     /// The work of each node.
@@ -81,6 +89,124 @@ pub(super) struct Node {
     pub runs: u32,
     pub rays: u64,
     pub busy_seconds: f64,
+    /// Of nodes with a budget.
+    #[serde(skip_serializing_if = "Option::is_none", flatten)]
+    pub exchange: Option<Exchange>,
+}
+
+/// What each node was given, and how it worked.
+#[derive(Debug, Serialize)]
+pub(super) struct Budget {
+    /// Of each node, bytes.
+    pub memory: u64,
+    pub scheduler: &'static str,
+    pub granularity: u16,
+    pub in_system: u32,
+    /// Side in pixels.
+    pub pyramid: u8,
+    /// Of the largest page.
+    pub page_bytes_max: usize,
+    pub voxels: u32,
+    pub plan: PlanReport,
+}
+
+/// What each node's memory is spent on.
+#[derive(Debug, Serialize)]
+pub(super) struct PlanReport {
+    pub terms: Vec<Term>,
+    pub total_bytes: u64,
+    /// Bytes for pages: those that stay, and the cache.
+    pub page_memory: u64,
+    /// Places of the cache, the lane's included.
+    pub cache_places: usize,
+    /// Whether every node has room for every page.
+    pub holds_all: bool,
+    /// Bytes of pages, of the node that owns least.
+    pub owned_bytes_least: u64,
+    /// Of the one that owns most.
+    pub owned_bytes_most: u64,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Term {
+    pub name: &'static str,
+    pub count: u64,
+    pub bytes_each: u64,
+    /// Rounded up to whole lines of 64.
+    pub bytes: u64,
+}
+
+impl PlanReport {
+    pub fn of(fit: &Fit) -> Self {
+        let sum = fit.plan.sum();
+        let terms = sum.terms().iter().map(|term| Term {
+            name: term.name,
+            count: term.count,
+            bytes_each: term.bytes_each,
+            bytes: term.bytes,
+        });
+        Self {
+            terms: terms.collect(),
+            total_bytes: sum.total_bytes(),
+            page_memory: (fit.plan.lines * size_of::<Line>()) as u64,
+            cache_places: fit.plan.places,
+            holds_all: fit.plan.holds_all,
+            owned_bytes_least: fit.owned_bytes.iter().min().copied().unwrap_or(0),
+            owned_bytes_most: fit.owned_bytes.iter().max().copied().unwrap_or(0),
+        }
+    }
+}
+
+/// What went to and fro at a node with a budget.
+#[derive(Debug, Serialize)]
+pub(super) struct Exchange {
+    /// Bytes of pages that it owns, rounded up to lines.
+    pub owned_bytes: u64,
+    pub traffic: Traffic,
+    /// Bytes in use at the worst moment, of its budget.
+    pub memory_high_water: u64,
+    /// The same queues in the same order on every node.
+    pub queues: Vec<QueueRun>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Traffic {
+    /// Rays that came from other nodes.
+    pub arrived: u64,
+    /// Rays that were sent to other nodes and taken.
+    pub forwarded: u64,
+    /// Rays that came back, since there was no room for them.
+    pub refused: u64,
+    /// Pages that came here.
+    pub fetched: u64,
+    /// Pages that were sent to others.
+    pub served: u64,
+}
+
+impl Exchange {
+    /// Of a node that worked under `plan`.
+    pub fn of(worked: &Worked, plan: &Plan, owned_bytes: u64) -> Self {
+        let (t, h) = (&worked.traffic, &worked.high_water);
+        let fixed = plan.sum().total_bytes() - (plan.lines * size_of::<Line>()) as u64;
+        Self {
+            owned_bytes,
+            traffic: Traffic {
+                arrived: t.arrived,
+                forwarded: t.forwarded,
+                refused: t.refused,
+                fetched: t.fetched,
+                served: t.served,
+            },
+            memory_high_water: fixed + h.page_bytes,
+            queues: queues(h),
+        }
+    }
+}
+
+fn queues(h: &HighWater) -> Vec<QueueRun> {
+    [("rays", h.rays), ("partial sums", h.partials), ("tiles", h.tiles), ("page requests", h.requests)]
+        .map(|(name, (high, limit))| QueueRun { name: name.to_owned(), high_water: high as u64, limit: limit as u64 })
+        .into()
 }
 
 /// Most bytes that this process held at once; known on Linux only.

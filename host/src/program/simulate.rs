@@ -1,30 +1,28 @@
 //! `hybray simulate`.
 
 use super::args::{SimulateArgs, Where};
+use super::budget::Farm;
 use super::render::{check_camera, interrupts};
 use super::report::ReportFile;
 use super::show::Show;
-use super::{End, camera, load};
+use super::{End, camera, prepare};
 use crate::model::Settings;
-use crate::prepare::Prepared;
+use crate::pack::is_packed;
+use crate::partition::page_bytes_for;
 use crate::simulate::record::{Report, Run};
-use crate::simulate::runs::{Experiment, name_of, scheduler};
+use crate::simulate::runs::{Experiment, name_of};
 use crate::simulate::{csv, html};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use hybray_link::HOST;
+use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::Options;
-use hybray_scheduler::policy::Policy;
+use hybray_simulated::NODES_MAX;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let interrupted = interrupts()?;
-    let policies = args.scheduler.iter().map(|name| {
-        let known = || Policy::ALL.map(|(name, _)| name).join(", ");
-        scheduler(name).with_context(|| format!("there is no scheduler `{name}`; there are {}", known()))
-    });
-    let policies = policies.collect::<Result<Vec<_>>>()?;
     // What could go wrong at the end is tried at the beginning.
     let outputs = [&args.json, &args.csv, &args.html];
     let to_standard_output = |path: &&Option<PathBuf>| path.as_deref() == Some(Path::new("-"));
@@ -35,16 +33,27 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let (json, csv, html) = (json?, csv?, html?);
 
     let mut show = Show::new(args.quiet);
-    let (model, _) = load(&args.scene, args.size)?;
-    model.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
-    let camera = camera(&model.cameras, args.camera.as_deref())?.clone();
-    show.line(&format!("{}: {} primitives", args.scene.scene, model.primitives()));
-    let prepared = Prepared::new(model, &args.tree.settings())?;
+    // One scene for all runs: its pages are such as the smallest nodes can have.
+    let page_sizes = args.memory.iter().flat_map(|&memory| args.nodes.iter().map(move |&n| page_bytes_for(memory, n)));
+    let page_bytes = page_sizes.min().unwrap_or(PAGE_BYTES_MAX as u32);
+    let (prepared, _) = prepare(&args.scene, &args.tree, args.size, page_bytes)?;
+    prepared.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
+    show.line(&format!("{}: {} primitives", args.scene.scene, prepared.primitives.iter().sum::<u64>()));
+    let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
     let wanted = Settings { size: args.size, spp: args.spp, depth: args.depth, seed: args.seed, ..Settings::default() };
     let frame = prepared.frame(&camera, &wanted);
     check_camera(&frame)?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
+    // One node alone has the whole scene.
+    let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
+    for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
+        let packed = is_packed(&args.scene.scene);
+        let farm = Farm { nodes, memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        if nodes > 1 {
+            farm.fit(&prepared, &scene)?;
+        }
+    }
 
     let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
     experiment.dispatcher = match args.dispatcher {
@@ -55,9 +64,10 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
     experiment.memory = args.memory;
-    for (policy, &nodes) in policies.iter().flat_map(|policy| args.nodes.iter().map(move |nodes| (policy, nodes))) {
-        experiment.settings = args.machine.settings(*policy);
-        show.line(&format!("{}, {} with {nodes} node{}", args.machine.name, name_of(*policy), if nodes == 1 { "" } else { "s" }));
+    for (policy, nodes) in farms {
+        experiment.settings = args.work.settings(args.machine.settings(policy));
+        let s = if nodes == 1 { "" } else { "s" };
+        show.line(&format!("{}, {} with {nodes} node{s}", args.machine.name, name_of(policy)));
         show.begin();
         let run = experiment.run(nodes, &mut |progress| {
             show.progress(progress);

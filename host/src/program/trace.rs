@@ -5,6 +5,7 @@ use super::{End, prepare};
 use anyhow::{Context, Result, bail};
 use hybray_bintree::walk::{Counts, Stack, nearest};
 use hybray_geometry::{Candidate, Ray, Vec3};
+use hybray_scene::PAGE_BYTES_MAX;
 use hybray_tracer::{Scene, surface_point};
 use std::io::{BufRead, BufReader, BufWriter, Read, Write};
 
@@ -57,7 +58,7 @@ impl Tracer<'_> {
 }
 
 pub(super) fn run(args: &TraceArgs) -> Result<End> {
-    let (prepared, _) = prepare(&args.scene, &args.tree.settings())?;
+    let (prepared, _) = prepare(&args.scene, &args.tree, None, PAGE_BYTES_MAX as u32)?;
     let pages = prepared.packed.open()?;
     let mut tracer = Tracer {
         scene: prepared.scene(&pages),

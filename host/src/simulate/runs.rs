@@ -31,6 +31,8 @@ pub struct Experiment<'a> {
     pub settings: Settings,
     /// What each node has, bytes; everything if it is not given.
     pub memory: Option<u64>,
+    /// What of it is for pages at most, bytes.
+    pub page_memory: Option<u64>,
     /// The run of one node, when it has been made.
     alone: Option<Simulated>,
     pages: Vec<&'a [u8]>,
@@ -61,6 +63,7 @@ impl<'a> Experiment<'a> {
             options: Options::default(),
             settings: machine.settings(Policy::default()),
             memory: None,
+            page_memory: None,
             alone: None,
             pages: prepared.packed.page_slices(),
         }
@@ -72,7 +75,11 @@ impl<'a> Experiment<'a> {
     /// If they do not fit: what would do.
     pub fn owners(&self, nodes: Peer, memory: u64) -> Result<Vec<u16>, RunError> {
         let packed = &self.prepared.packed;
-        let plan = Plan::new(Sizes::of(self.scene), nodes, memory, None, self.settings.policy).map_err(SimulateError::Plan)?;
+        let mut plan =
+            Plan::new(Sizes::of(self.scene), nodes, memory, None, self.settings.policy).map_err(SimulateError::Plan)?;
+        if let Some(bytes) = self.page_memory {
+            plan = plan.with_page_memory(bytes, nodes, None);
+        }
         Ok(owners(&packed.placed_pages(), packed.voxels(), nodes, plan.owned_bytes_max())?)
     }
 
@@ -85,7 +92,7 @@ impl<'a> Experiment<'a> {
         // The one-node run has unlimited memory (DESIGN section 12).
         let memory = self.memory.filter(|_| nodes > 1);
         let owners = memory.map(|memory| self.owners(nodes, memory)).transpose()?;
-        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget { memory, owners });
+        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget { memory, page_memory: self.page_memory, owners });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
     }

@@ -1,11 +1,13 @@
 //! The `hybray` program as people meet it: what it prints where, what it writes, how it ends.
 
+mod budget;
 mod convert;
 mod ends;
 mod errors;
 mod pack;
 mod pictures;
 mod report;
+mod simulate;
 mod talk;
 mod trace;
 

@@ -45,13 +45,26 @@ fn completions_and_manual() {
     for (shell, word) in [("bash", "complete -F _hybray"), ("zsh", "#compdef hybray"), ("fish", "complete -c hybray")] {
         let script = text(&folder, &format!("completions {shell}"));
         assert!(script.contains(word) && script.contains("page-bytes"), "{shell}");
+        for word in ["plan", "granularity", "in-system", "pyramid", "hybrid-1995", "powerxplorer"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
     }
     let manual = text(&folder, "man");
-    for word in [".TH hybray", "render", "trace", "convert", ".TH hybray-render", ".TH hybray-trace"] {
+    for word in [
+        ".TH hybray",
+        "render",
+        "trace",
+        "convert",
+        ".TH hybray-render",
+        ".TH hybray-trace",
+        ".TH hybray-plan",
+        "demand\\-driven",
+        "T800",
+    ] {
         assert!(manual.contains(word), "{word}");
     }
     let help = text(&folder, "render --help");
-    for word in ["--output", "--size", "--nodes", "--json"] {
+    for word in ["--output", "--size", "--nodes", "--json", "--memory", "--granularity", "data-parallel"] {
         assert!(help.contains(word), "{word}");
     }
     assert!(text(&folder, "--version").starts_with("hybray "));
@@ -85,6 +98,8 @@ fn a_closed_pipe_is_no_error() {
         "--help",
         "render spd:balls:1 --size 8x8 --spp 1 -q -o a.png --json -",
         "trace spd:balls:1",
+        "plan spd:balls:1 --nodes 2 --memory 1MiB",
+        "simulate spd:balls:1 --machine threads --nodes 2 --size 8x8 -q",
     ] {
         check_unread(&folder, arguments);
     }

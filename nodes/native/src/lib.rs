@@ -9,7 +9,7 @@ use hybray_runner::{run_master, run_node};
 use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
-    All, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Plan,
+    All, Asked, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, PageServer, Plan,
     PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw,
 };
 use hybray_tracer::Scene;
@@ -93,7 +93,7 @@ pub fn trace(
 ) -> Option<Traced> {
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes();
-    run(frame, scene_hash, farm, watch, &|peer, link, dispatcher, clock| {
+    run(frame, scene_hash, farm, &[], watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
         let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
@@ -126,7 +126,7 @@ pub fn trace_within(
     scene.resident.directory.entries = &entries;
     let plan = plan(&scene, farm.nodes, budget.memory, budget.settings.policy)?;
     let bytes = plan.sum().total_bytes();
-    Ok(run(frame, scene_hash, farm, watch, &|peer, link, dispatcher, clock| {
+    Ok(run(frame, scene_hash, farm, budget.pages, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let (memory, mut cache, scene) =
             plan.carve(&mut Arena::new(&mut memory), &scene).expect("the sum of its terms");
@@ -190,11 +190,12 @@ pub struct Worked {
     pub high_water: HighWater,
 }
 
-/// Runs the machines: `node` makes and turns each node, on a thread of its own.
+/// Runs the machines; the host gives out `pages` whose owners are lost. `node` makes and turns each node, on a thread of its own.
 fn run(
     frame: &Frame,
     scene_hash: u64,
     farm: &Farm,
+    pages: &[&[u8]],
     watch: &mut dyn FnMut(Progress) -> bool,
     node: &(dyn Fn(Peer, &mut MemoryLink, Option<Dispatcher<'_>>, &Clock) -> Worked + Sync),
 ) -> Option<Traced> {
@@ -227,7 +228,9 @@ fn run(
         }
         let mut states = vec![NodeState::default(); peers];
         let dispatcher = (dispatcher_at == HOST).then(|| Dispatcher::new(&mut states, farm.options));
-        let outcome = run_master(&mut master, dispatcher, &mut host_link, &mut { clock }, watch);
+        let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
+        let server = PageServer::new(&mut asked, &mut turns);
+        let outcome = run_master(&mut master, dispatcher, server, pages, &mut host_link, &mut { clock }, watch);
         drop(host_link);
         (outcome, start.elapsed())
     });

@@ -6,8 +6,8 @@
 #![forbid(unsafe_code)]
 
 use hybray_link::{Event, Link};
-use hybray_scheduler::{Dispatcher, Master, Node, Outcome, Progress, Store};
-use hybray_wire::{View, decode};
+use hybray_scheduler::{Dispatcher, Master, Node, Outcome, PageServer, Progress, Store};
+use hybray_wire::{Message, View, decode};
 
 /// How long a participant that has nothing to do waits for something to arrive, nanoseconds.
 const WAIT: u64 = 20_000_000;
@@ -79,21 +79,27 @@ pub fn run_node<P: Store>(
     }
 }
 
-/// Runs the master, and a dispatcher beside it if it has one, until the picture has ended. `watch` is called often with how
-/// far it is; when it returns false, the picture is ended as it is.
+/// Runs the master, and a dispatcher beside it if it has one, until the picture has ended. `server` gives out the bytes of
+/// `pages` that nodes ask the host for. `watch` is called often with how far it is; when it returns false, the picture is
+/// ended as it is.
 pub fn run_master(
     master: &mut Master<'_>,
     mut dispatcher: Option<Dispatcher<'_>>,
+    mut server: PageServer<'_>,
+    pages: &[&[u8]],
     link: &mut dyn Link,
     clock: &mut dyn FnMut() -> u64,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Outcome {
     loop {
         let now = clock();
-        let busy = receive(link, |arrival| match arrival {
+        let mut busy = receive(link, |arrival| match arrival {
             Arrival::Message { from, view } => {
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.handle(from, &view.message, now);
+                }
+                if let Message::Fetch { page } = view.message {
+                    server.fetch(from, page);
                 }
                 master.handle(from, &view);
             }
@@ -102,9 +108,14 @@ pub fn run_master(
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.lost(peer);
                 }
+                server.lost(peer);
                 master.lost(peer);
             }
         });
+        busy |= server.serve(link, &|page| pages.get(page as usize).copied()).0;
+        if let Some(page) = server.missing() {
+            master.missing(page);
+        }
         if !watch(master.progress()) {
             master.stop();
         }

@@ -14,15 +14,15 @@ mod turn;
 mod worker;
 mod world;
 
-pub use hybray_sim::{LinkCounts, LinkModel, NetworkModel, Topology, Traffic};
+pub use hybray_sim::{LinkCounts, LinkModel, Network, NetworkModel, Topology, Traffic};
 pub use hybray_scheduler::Traffic as Exchange;
 pub use machine::{Costs, MACHINES, Machine, MessageCosts, Operations};
 
 use hybray_link::Peer;
 use hybray_scene::{Line, lines_for, parents};
 use hybray_scheduler::{
-    Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, Plan, PlanError, Progress, Settings, Sizes, TileState,
-    can_draw,
+    Asked, Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, PageServer, Plan, PlanError, Progress,
+    Settings, Sizes, TileState, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -52,6 +52,8 @@ pub struct Farm<'a> {
 pub struct Budget<'a> {
     /// What each node has, bytes: everything that it works in.
     pub memory: u64,
+    /// What of it is for pages at most, bytes; what there is if it is not given.
+    pub page_memory: Option<u64>,
     /// The node that owns each page.
     pub owners: &'a [u16],
 }
@@ -122,6 +124,8 @@ pub struct Simulated {
     pub host: Traffic,
     /// Every directed physical link.
     pub links: Vec<LinkCounts>,
+    /// Frames and bytes of each kind of message, to others.
+    pub kinds: Vec<(&'static str, (u64, u64))>,
     /// Frames delivered.
     pub frames: u64,
     /// Frames that made no sense.
@@ -160,17 +164,21 @@ pub fn simulate(
     farm: &Farm<'_>,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Simulated, SimulateError> {
-    prepared(scene, scene_hash, pages, frame, farm, &mut |_| {}, watch)
+    simulate_spoiled(scene, scene_hash, pages, frame, farm, &mut |_| {}, watch)
 }
 
-/// [`simulate`] on a network that `spoil` may do something to first.
-fn prepared(
+/// [`simulate`] on a network that `spoil` may do something to first: delay frames, cut participants off from each other,
+/// or have nodes lost.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_spoiled(
     scene: &Scene<'_>,
     scene_hash: u64,
     pages: &[&[u8]],
     frame: &Frame,
     farm: &Farm<'_>,
-    spoil: &mut dyn FnMut(&mut hybray_sim::Network),
+    spoil: &mut dyn FnMut(&mut Network),
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Simulated, SimulateError> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame)).ok_or(SimulateError::NoPicture)?;
@@ -195,6 +203,9 @@ fn prepared(
         }
         let owned_max = owned.into_iter().max();
         plan = Plan::new(Sizes::of(&scene), farm.nodes, budget.memory, owned_max, farm.settings.policy)?;
+        if let Some(bytes) = budget.page_memory {
+            plan = plan.with_page_memory(bytes, farm.nodes, owned_max);
+        }
     }
     scene.resident.directory.entries = &entries;
     let mut up = vec![0; scene.resident.directory.nodes.len() + entries.len()];
@@ -204,7 +215,9 @@ fn prepared(
     let mut memories: Vec<worker::Memory> = (1..peers).map(|_| worker::memory(&plan)).collect();
     let workers =
         (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
-    let mut world = world::World::new(farm, plan, master, &mut states, workers);
+    let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
+    let server = PageServer::new(&mut asked, &mut turns);
+    let mut world = world::World::new(farm, plan, master, &mut states, server, pages, workers);
     spoil(world.network());
     world.run(watch)
 }

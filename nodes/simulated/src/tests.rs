@@ -4,6 +4,7 @@ use super::*;
 use hybray_bintree::walk::Resident;
 use hybray_link::HOST;
 use hybray_scene::Directory;
+use hybray_scheduler::policy::Policy;
 
 const FRAME: Frame = Frame {
     width: 150,
@@ -40,11 +41,13 @@ fn sky() -> Scene<'static> {
 }
 
 fn farm(machine: &'static str, nodes: Peer, dispatcher: Peer) -> Farm<'static> {
-    Farm { machine: Machine::named(machine).unwrap(), nodes, dispatcher, options: Options::default() }
+    let machine = Machine::named(machine).unwrap();
+    let settings = machine.settings(Policy::default());
+    Farm { machine, nodes, dispatcher, options: Options::default(), settings, budget: None }
 }
 
 fn run(farm: &Farm<'_>, frame: &Frame) -> Simulated {
-    let run = simulate(&sky(), 1, frame, farm, &mut |_| true).unwrap_or_else(|e| panic!("{farm:?}: {e}"));
+    let run = simulate(&sky(), 1, &[], frame, farm, &mut |_| true).unwrap_or_else(|e| panic!("{farm:?}: {e}"));
     assert_eq!((run.outcome, run.refused_frames), (Outcome::Finished, 0), "{farm:?}");
     let tiles: u32 = run.nodes.iter().map(|node| node.report.tiles).sum();
     assert_eq!(tiles, TileMap::new(frame.width, frame.height).unwrap().len(), "{farm:?}");
@@ -96,19 +99,19 @@ fn a_thousand_nodes_share_a_small_picture() {
 #[test]
 fn what_is_stopped_ends() {
     let farm = farm("gigabit", 5, HOST);
-    let run = simulate(&sky(), 1, &FRAME, &farm, &mut |progress| progress.finished < 20).unwrap();
+    let run = simulate(&sky(), 1, &[], &FRAME, &farm, &mut |progress| progress.finished < 20).unwrap();
     assert_eq!(run.outcome, Outcome::Stopped);
 }
 
 #[test]
 fn a_cut_network_is_an_error_that_says_where() {
     let farm = farm("gigabit", 1, HOST);
-    let cut = &mut |network: &mut hybray_sim::Network| network.cut(HOST, 1, u64::MAX);
-    let error = prepared(&sky(), 1, &FRAME, &farm, cut, &mut |_| true).unwrap_err();
+    let cut = &mut |network: &mut Network| network.cut(HOST, 1, 0, u64::MAX);
+    let error = simulate_spoiled(&sky(), 1, &[], &FRAME, &farm, cut, &mut |_| true).unwrap_err();
     assert!(matches!(&error, SimulateError::Stuck { state, .. } if state.contains("node 1: Asleep")), "{error}");
     // For a while only: it goes on.
-    let cut = &mut |network: &mut hybray_sim::Network| network.cut(HOST, 1, 3_000_000_000);
-    let run = prepared(&sky(), 1, &FRAME, &farm, cut, &mut |_| true).unwrap();
+    let cut = &mut |network: &mut Network| network.cut(HOST, 1, 0, 3_000_000_000);
+    let run = simulate_spoiled(&sky(), 1, &[], &FRAME, &farm, cut, &mut |_| true).unwrap();
     assert_eq!(run.outcome, Outcome::Finished);
     assert!((3_000_000_000..3_001_000_000).contains(&run.loading_ns), "{}", run.loading_ns);
 }
@@ -117,16 +120,16 @@ fn a_cut_network_is_an_error_that_says_where() {
 fn a_lost_node_is_done_without() {
     let farm = farm("gigabit", 3, HOST);
     let film = run(&farm, &FRAME).film;
-    let lose = &mut |network: &mut hybray_sim::Network| network.lose(2, 30_000_000, 1_000_000);
-    let run = prepared(&sky(), 1, &FRAME, &farm, lose, &mut |_| true).unwrap();
+    let lose = &mut |network: &mut Network| network.lose(2, 30_000_000, 1_000_000);
+    let run = simulate_spoiled(&sky(), 1, &[], &FRAME, &farm, lose, &mut |_| true).unwrap();
     assert_eq!((run.outcome, run.film), (Outcome::Finished, film));
 }
 
 #[test]
 fn what_cannot_be_is_refused() {
     let none = farm("gigabit", 0, HOST);
-    assert_eq!(simulate(&sky(), 1, &FRAME, &none, &mut |_| true).unwrap_err(), SimulateError::NoFarm);
+    assert_eq!(simulate(&sky(), 1, &[], &FRAME, &none, &mut |_| true).unwrap_err(), SimulateError::NoFarm);
     let empty = Frame { width: 0, ..FRAME };
-    let error = simulate(&sky(), 1, &empty, &farm("gigabit", 1, HOST), &mut |_| true).unwrap_err();
+    let error = simulate(&sky(), 1, &[], &empty, &farm("gigabit", 1, HOST), &mut |_| true).unwrap_err();
     assert_eq!(error, SimulateError::NoPicture);
 }

@@ -15,6 +15,26 @@ pub(crate) struct Said {
     pub frames: u32,
     /// When the first run of tiles left.
     pub first_tiles_ns: Option<u64>,
+    /// Frames and bytes of each kind, to others.
+    pub kinds: [(u64, u64); KINDS.len()],
+}
+
+/// Kinds of messages, as they are counted.
+pub(crate) const KINDS: [&str; 9] =
+    ["sums of tiles", "rays", "taken", "partial sums", "fetch", "pages", "runs of tiles", "shares", "others"];
+
+fn kind(message: Option<&Message>) -> usize {
+    match message {
+        Some(Message::Contributions { .. }) => 0,
+        Some(Message::Rays { .. }) => 1,
+        Some(Message::Took { .. }) => 2,
+        Some(Message::Partials { .. }) => 3,
+        Some(Message::Fetch { .. }) => 4,
+        Some(Message::Part { .. }) => 5,
+        Some(Message::Tiles { .. } | Message::Done { .. }) => 6,
+        Some(Message::Share { .. } | Message::Idle) => 7,
+        _ => 8,
+    }
 }
 
 /// The link of a participant that sends: frames leave one after the other, each when it is packed.
@@ -55,6 +75,9 @@ impl Link for Turn<'_> {
             // What one says to oneself is a call.
             if to != *me {
                 said.spent_ps += machine.messages.sent + contents_ps(machine, message.as_ref(), used);
+                let (frames, bytes) = &mut said.kinds[kind(message.as_ref())];
+                *frames += 1;
+                *bytes += used as u64;
             }
             said.frames += 1;
             let leaves_ns = *now_ns + said.spent_ps / 1000;

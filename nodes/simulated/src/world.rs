@@ -4,12 +4,13 @@ use crate::machine::Operations;
 use crate::meter::Meter;
 use crate::schedule::{Phase, Schedule};
 use crate::take::{Arrival, Taken, take};
-use crate::turn::{Said, Turn};
+use crate::turn::{KINDS, Said, Turn};
 use crate::worker::Worker;
 use crate::{Farm, NodeRun, SimulateError, Simulated};
 use hybray_link::{HOST, Peer};
-use hybray_scheduler::{Dispatcher, Master, NodeState, Outcome, Plan, Progress};
+use hybray_scheduler::{Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
 use hybray_sim::Network;
+use hybray_wire::Message;
 
 /// Virtual time in which nobody does anything, after which nobody ever will: far beyond any latency.
 const IDLE_NS_MAX: u64 = 100_000_000_000_000;
@@ -34,7 +35,12 @@ pub(crate) struct World<'a, 'm, 's> {
     network: Network,
     master: Master<'m>,
     dispatcher: Dispatcher<'m>,
+    /// At the host, for pages whose owners are lost.
+    server: PageServer<'m>,
+    pages: &'a [&'a [u8]],
     seats: Vec<Seat<'s>>,
+    /// Frames and bytes of each kind, to others.
+    kinds: [(u64, u64); KINDS.len()],
     plan: Plan,
     schedule: Schedule,
     meter: Meter,
@@ -56,6 +62,8 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
         plan: Plan,
         master: Master<'m>,
         states: &'m mut [NodeState],
+        server: PageServer<'m>,
+        pages: &'a [&'a [u8]],
         workers: Vec<Worker<'s>>,
     ) -> Self {
         let peers = farm.nodes + 1;
@@ -64,6 +72,8 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             network: Network::new(&farm.machine.network(farm.nodes), peers),
             master,
             dispatcher: Dispatcher::new(states, farm.options),
+            server,
+            pages,
             seats: workers
                 .into_iter()
                 .map(|worker| Seat {
@@ -84,6 +94,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             gathered_ns: None,
             done_ns: 0,
             progress: (0, 0),
+            kinds: [(0, 0); KINDS.len()],
         }
     }
 
@@ -110,6 +121,10 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             if self.is_stuck(now) {
                 return Err(self.stuck(now));
             }
+            if self.network.is_gone(me) {
+                self.schedule.leave(me);
+                continue;
+            }
             match (self.schedule.begin(me), me) {
                 (Phase::Send { busy }, _) => self.send(me, now, busy),
                 (_, HOST) => self.take_host(now, watch),
@@ -134,13 +149,16 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
     }
 
     fn take_host(&mut self, now: u64, watch: &mut dyn FnMut(Progress) -> bool) {
-        let Self { network, master, dispatcher, farm, gathered_ns, .. } = self;
+        let Self { network, master, dispatcher, server, farm, gathered_ns, .. } = self;
         let dispatches = farm.dispatcher == HOST;
         let Taken { spent_ps, frames, .. } = take(network, farm.machine, HOST, now, |arrival, now| {
             match arrival {
                 Arrival::Message { from, view } => {
                     if dispatches {
                         dispatcher.handle(from, &view.message, now);
+                    }
+                    if let Message::Fetch { page } = view.message {
+                        server.fetch(from, page);
                     }
                     master.handle(from, &view);
                 }
@@ -149,6 +167,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
                     if dispatches {
                         dispatcher.lost(peer);
                     }
+                    server.lost(peer);
                     master.lost(peer);
                 }
             }
@@ -217,7 +236,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
     }
 
     fn send(&mut self, me: Peer, now: u64, busy: bool) {
-        let Self { network, master, dispatcher, seats, farm, .. } = self;
+        let Self { network, master, dispatcher, server, pages, seats, farm, .. } = self;
         let machine = farm.machine;
         let seat = usize::from(me).checked_sub(1).map(|number| &mut seats[number]);
         let mut no_run = 0;
@@ -232,12 +251,21 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
                 worker.poll(&mut turn, now);
                 stopped = worker.is_stopped();
             }
-            None => master.poll(&mut turn),
+            None => {
+                server.serve(&mut turn, &|page| pages.get(page as usize).copied());
+                if let Some(page) = server.missing() {
+                    master.missing(page);
+                }
+                master.poll(&mut turn);
+            }
         }
         if farm.dispatcher == me {
             dispatcher.poll(&mut turn, now);
         }
-        let Said { spent_ps, frames, first_tiles_ns } = turn.said;
+        let Said { spent_ps, frames, first_tiles_ns, kinds } = turn.said;
+        for (all, (frames, bytes)) in self.kinds.iter_mut().zip(kinds) {
+            *all = (all.0 + frames, all.1 + bytes);
+        }
 
         if let (None, Some(first)) = (self.first_tiles_ns, first_tiles_ns) {
             self.first_tiles_ns = Some(first);
@@ -311,6 +339,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             nodes: nodes.collect(),
             host: network.traffic(HOST),
             links: network.links().collect(),
+            kinds: KINDS.into_iter().zip(self.kinds).collect(),
             frames: network.delivered(),
             refused_frames: self.master.refused_frames(),
             plan: self.plan,

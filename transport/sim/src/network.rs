@@ -12,9 +12,19 @@ struct Frame {
     from: Peer,
     to: Peer,
     at: Place,
-    /// No frame, but the news that `from` is lost.
-    is_loss: bool,
+    kind: Kind,
     bytes: Vec<u8>,
+}
+
+/// What stands in the queue of events.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Frame,
+    /// The news that `from` is lost.
+    Loss,
+    /// The end of `from`, of which the others learn so much later.
+    End { notice_ns: u64 },
 }
 
 /// What is known of one participant's frames to another, from the first one on.
@@ -103,7 +113,8 @@ pub struct Network {
     log: u64,
     delivered: u64,
     delays: Option<Delays>,
-    cuts: BTreeMap<(Peer, Peer), u64>,
+    /// From when, and until.
+    cuts: BTreeMap<(Peer, Peer), (u64, u64)>,
 }
 
 impl Network {
@@ -198,24 +209,38 @@ impl Network {
         self.delays = Some(Delays { seed, delay_ns_max });
     }
 
-    /// Frames that `a` sends to `b`, or `b` to `a`, wait until `until_ns`; those on the way go on.
-    pub fn cut(&mut self, a: Peer, b: Peer, until_ns: u64) {
+    /// Frames that `a` sends to `b`, or `b` to `a`, from `from_ns` on wait until `until_ns`; those on the way go on. The
+    /// last cut between two counts.
+    pub fn cut(&mut self, a: Peer, b: Peer, from_ns: u64, until_ns: u64) {
         for pair in [(a, b), (b, a)] {
-            self.cuts.insert(pair, until_ns);
+            self.cuts.insert(pair, (from_ns, until_ns));
         }
     }
 
-    /// `peer` is no more. What it sent arrives until the others learn that it is lost, `notice_ns` later; its router
-    /// works on.
-    pub fn lose(&mut self, peer: Peer, now_ns: u64, notice_ns: u64) {
+    /// `peer` is no more from `at_ns` on, which may be to come. What it sent arrives until the others learn that it is
+    /// lost, `notice_ns` later; its router works on.
+    pub fn lose(&mut self, peer: Peer, at_ns: u64, notice_ns: u64) {
+        let end = self.new_frame(peer, peer);
+        self.frames[end as usize].kind = Kind::End { notice_ns };
+        self.set_going(at_ns, end);
+    }
+
+    /// Whether a participant is no more.
+    #[must_use]
+    pub fn is_gone(&self, peer: Peer) -> bool {
+        self.sides[usize::from(peer)].gone
+    }
+
+    /// The others will hear of it, each at the same time.
+    fn end_side(&mut self, peer: Peer, news_ns: u64) {
         if std::mem::replace(&mut self.sides[usize::from(peer)].gone, true) {
             return;
         }
         for to in (0..self.peers()).filter(|&to| to != peer) {
             let frame = self.new_frame(peer, to);
-            self.frames[frame as usize].is_loss = true;
+            self.frames[frame as usize].kind = Kind::Loss;
             self.frames[frame as usize].at = self.routes.place(to);
-            self.set_going(now_ns.saturating_add(notice_ns), frame);
+            self.set_going(news_ns, frame);
         }
     }
 
@@ -256,8 +281,12 @@ impl Network {
             Some(Delays { seed, delay_ns_max }) => mix(seed ^ mix(self.set_going)) % delay_ns_max.saturating_add(1),
             None => 0,
         };
-        let cut = self.cuts.get(&(from, to)).copied().unwrap_or(0);
-        entered_ns = entered_ns.max(ready_ns.max(now_ns).saturating_add(chance)).max(cut);
+        entered_ns = entered_ns.max(ready_ns.max(now_ns).saturating_add(chance));
+        if let Some(&(cut_ns, until_ns)) = self.cuts.get(&(from, to))
+            && entered_ns >= cut_ns
+        {
+            entered_ns = entered_ns.max(until_ns);
+        }
         let side = &mut self.sides[usize::from(from)];
         if let Some(pair) = side.pairs.get_mut(&to) {
             pair.entered_ns = entered_ns;
@@ -275,7 +304,7 @@ impl Network {
         let Some(number) = self.sides[usize::from(me)].inbox.pop_front() else { return false };
         let frame = std::mem::take(&mut self.frames[number as usize]);
         let from = frame.from;
-        if frame.is_loss {
+        if frame.kind == Kind::Loss {
             self.sides[usize::from(me)].pairs.entry(from).or_default().closed = true;
             read(Event::Lost { peer: from });
         } else {
@@ -302,7 +331,7 @@ impl Network {
             self.frames.len() as u32 - 1
         });
         let frame = &mut self.frames[number as usize];
-        (frame.from, frame.to, frame.at, frame.is_loss) = (from, to, self.routes.place(from), false);
+        (frame.from, frame.to, frame.at, frame.kind) = (from, to, self.routes.place(from), Kind::Frame);
         frame.bytes.clear();
         number
     }
@@ -320,6 +349,12 @@ impl Network {
     /// `number` is whole where it is: it asks for its next link, or has arrived.
     fn move_on(&mut self, now: u64, number: u32) {
         let frame = &mut self.frames[number as usize];
+        if let Kind::End { notice_ns } = frame.kind {
+            let (peer, frame) = (frame.from, std::mem::take(frame));
+            self.let_go(number, frame);
+            self.end_side(peer, now.saturating_add(notice_ns));
+            return;
+        }
         let Some((link, place)) = self.routes.next(frame.at, frame.to) else {
             self.arrive(now, number);
             return;
@@ -346,7 +381,8 @@ impl Network {
     }
 
     fn arrive(&mut self, now: u64, number: u32) {
-        let Frame { from, to, is_loss, ref bytes, .. } = self.frames[number as usize];
+        let Frame { from, to, kind, ref bytes, .. } = self.frames[number as usize];
+        let is_loss = kind == Kind::Loss;
         let gone = self.sides[usize::from(to)].gone;
         let pair = self.sides[usize::from(from)].pairs.entry(to).or_default();
         if pair.closed || gone {

@@ -200,7 +200,7 @@ fn order_holds_under_delays_and_everything_repeats() {
 #[test]
 fn a_cut_pair_waits_and_others_do_not() {
     let mut network = network(Topology::Crossbar, 4);
-    network.cut(1, 2, 50_000);
+    network.cut(1, 2, 0, 50_000);
     assert!(send(&mut network, 1, 2, 0, 100, 1) && send(&mut network, 2, 1, 10, 100, 2));
     assert!(send(&mut network, 1, 3, 10, 100, 3) && send(&mut network, 1, 2, 60_000, 100, 4));
     let expected = [(2150, 3, 1, 100, 3), (52_140, 1, 2, 100, 2), (52_140, 2, 1, 100, 1), (62_140, 2, 1, 100, 4)];
@@ -213,9 +213,13 @@ fn the_lost_are_never_heard_of_again() {
     assert!(send(&mut network, 1, 2, 0, 100, 1) && send(&mut network, 1, 2, 9_000, 100, 2));
     assert!(send(&mut network, 3, 1, 9_000, 100, 3));
     network.lose(1, 9_500, 600);
+    network.advance(9_499);
+    assert!(!network.is_gone(1));
+    network.advance(9_500);
+    assert!(network.is_gone(1));
     assert!(!send(&mut network, 1, 3, 9_600, 1, 0));
     assert!(send(&mut network, 2, 1, 9_600, 1, 0), "who does not know yet still sends");
-    let expected = [(2140, 2, 1, 100, 1), (10_100, 0, 1, 0, 0), (10_100, 2, 1, 0, 0), (10_100, 3, 1, 0, 0)];
+    let expected = [(9_600, 2, 1, 100, 1), (10_100, 0, 1, 0, 0), (10_100, 2, 1, 0, 0), (10_100, 3, 1, 0, 0)];
     assert_eq!(arrivals(&mut network), expected);
     assert!(!send(&mut network, 2, 1, 20_000, 1, 0));
     assert!(send(&mut network, 2, 3, 20_000, 1, 0));

@@ -2,7 +2,7 @@
 
 use super::tiles::{OpenTile, Stage as TileStage, TILE_PIXELS, place_of};
 use super::{Node, Store};
-use crate::send;
+use crate::{rules, send};
 use crate::node::store::Landed;
 use bytemuck::{bytes_of, pod_read_unaligned};
 use hybray_arena::List;
@@ -12,8 +12,6 @@ use hybray_wire::{
     BODY_BYTES_MAX, HEAD_BYTES_MAX, Message, Partial, RayKind, RayRecord, ShadowRecord, TileMap, View, encode,
 };
 
-/// Bytes of a page in one frame.
-const PART_BYTES: usize = 4096;
 /// Partial sums in one frame.
 const PARTIALS_MAX: usize = BODY_BYTES_MAX / size_of::<Partial>();
 /// Rays in one frame at most, whatever the settings say.
@@ -34,7 +32,7 @@ impl<P: Store> Node<'_, '_, P> {
                 (peer.load, peer.full) = (load, !taken);
                 let mut flight = core::mem::take(&mut peer.flight);
                 let count = flight.len() as u64;
-                if taken {
+                if rules::frees(taken) {
                     self.traffic.forwarded += count;
                     while self.memory.pool.pop(&mut flight).is_some() {}
                     return;
@@ -63,10 +61,10 @@ impl<P: Store> Node<'_, '_, P> {
             self.helped = true;
             return;
         }
-        // Some room is kept for the rays of one's own tiles: else they would only ever go where the pool is.
-        let kept = self.memory.pool.capacity() / 8;
-        let taken = self.picture.is_some() && self.memory.pool.free() >= rays + shadows + kept;
+        let pool = &self.memory.pool;
+        let taken = self.picture.is_some() && rules::takes(rays + shadows, pool.free(), pool.capacity());
         self.memory.peers.answer(from, taken);
+        self.helped |= rules::was_helped(taken, false);
         if !taken {
             return;
         }
@@ -79,7 +77,7 @@ impl<P: Store> Node<'_, '_, P> {
                 continue;
             }
             self.traffic.arrived += 1;
-            self.helped |= ray.settled == 1 && ray.kind == RayKind::Primary as u8;
+            self.helped |= rules::was_helped(true, ray.settled == 1 && ray.kind == RayKind::Primary as u8);
             let here = self.store.page(ray.page).is_some();
             // There is room for all of them.
             let _ = self.memory.pool.push(ray, here);
@@ -139,13 +137,18 @@ impl<P: Store> Node<'_, '_, P> {
     /// better to do.
     pub(super) fn pay(&mut self, link: &mut dyn Link) -> bool {
         let mut sent = false;
-        let (idle, full) = (self.idle, self.memory.partials.free() * 2 < self.memory.partials.capacity());
+        let (free, capacity) = (self.memory.partials.free(), self.memory.partials.capacity());
+        let granularity = usize::from(self.settings.granularity);
         for _ in 0..self.memory.owing.len() {
             let Some(peer) = self.memory.owing.pop_front() else { break };
             let m = &mut self.memory;
             let list = &mut m.owed[usize::from(peer)];
+            if m.peers.get(peer).is_none_or(|p| p.lost) {
+                while m.partials.pop_front(list).is_some() {}
+                continue;
+            }
             let count = list.len().min(PARTIALS_MAX);
-            if !idle && !full && count < usize::from(self.settings.granularity) {
+            if !rules::pays(self.idle, free, capacity, count, granularity) {
                 let _ = m.owing.push_back(peer);
                 continue;
             }
@@ -173,37 +176,13 @@ impl<P: Store> Node<'_, '_, P> {
         sent
     }
 
-    /// Sends parts of pages to those who asked for them, one each.
-    pub(super) fn serve(&mut self, link: &mut dyn Link) -> bool {
-        let mut sent = false;
-        for _ in 0..self.memory.peers.serves() {
-            let Some((peer, page, offset)) = self.memory.peers.next_serve() else { break };
-            let bytes = self.store.bytes(page).unwrap_or(&[]);
-            let part = bytes.get(offset as usize..).unwrap_or(&[]);
-            let part = &part[..part.len().min(PART_BYTES)];
-            let message = Message::Part { page, offset, bytes: part.len() as u16 };
-            let lost = self.memory.peers.get(peer).is_none_or(|p| p.lost);
-            let went = lost
-                || link.send(peer, HEAD_BYTES_MAX + part.len(), &mut |room| {
-                    encode(&message, room, |body| body.copy_from_slice(part))
-                        .expect("the room for a message is enough for any")
-                });
-            let whole = lost || offset as usize + part.len() >= bytes.len();
-            self.traffic.served += u64::from(went && whole && !part.is_empty());
-            let count = part.len() as u32;
-            self.memory.peers.served(if went { count } else { 0 }, went && whole);
-            sent |= went;
-        }
-        sent
-    }
-
     /// Asks for pages that have a place.
     pub(super) fn ask(&mut self, link: &mut dyn Link) -> bool {
         let mut sent = false;
         for at in 0..self.requests.len() {
             let request = self.requests[at];
             let asked = self.requests.iter().filter(|r| r.sent && r.from == request.from).count();
-            if !request.sent && asked < super::peers::FETCHES {
+            if !request.sent && rules::may_ask(asked) {
                 self.requests[at].sent = send(link, request.from, &Message::Fetch { page: request.page });
                 sent |= self.requests[at].sent;
             }
@@ -226,16 +205,19 @@ impl<P: Store> Node<'_, '_, P> {
                 continue;
             }
             let since = state.since;
-            if state.outbox.is_empty() {
-                // Who asked for a share hears that there is none.
-                let nothing = Message::Rays { rays: 0, shadows: 0, load };
-                if state.flight.is_empty() && !send(link, peer, &nothing) {
+            if state.none_to_share {
+                state.none_to_share = !send(link, peer, &Message::Rays { rays: 0, shadows: 0, load });
+                if state.none_to_share {
                     m.peers.send_on(peer, since);
+                    continue;
                 }
+                sent = true;
+            }
+            if state.outbox.is_empty() {
                 continue;
             }
             let due = idle || state.outbox.len() >= granularity || now.saturating_sub(since) >= self.settings.deadline_ns;
-            if !due || !state.flight.is_empty() {
+            if !due || !rules::may_send(state.flight.len()) {
                 m.peers.send_on(peer, since);
                 continue;
             }

@@ -4,6 +4,7 @@ use super::pool::{PageState, Pool};
 use super::tiles::OpenTile;
 use super::{BUNDLE, Peers, Place};
 use crate::DEPTH_MAX;
+use crate::server::{Asked, PageServer};
 use hybray_arena::{Arena, List, Ring, Short, Slab, Sum};
 use hybray_bintree::walk::{Hit, Stack, Walked};
 use hybray_geometry::{Ray, Vec3};
@@ -53,6 +54,7 @@ pub struct NodeMemory<'m> {
     pub(super) owed: &'m mut [List],
     pub(super) owing: Ring<'m, u16>,
     pub(super) peers: Peers<'m>,
+    pub(super) server: PageServer<'m>,
 }
 
 /// The terms, in order: `$do!(name, type, count, value)` for each.
@@ -82,6 +84,7 @@ macro_rules! terms {
             $do!("peers that partial sums are for", u16, l.peers, || 0u16),
             $do!("what is known of peers", super::PeerState, l.peers, || super::PeerState::NEW),
             $do!("peers to answer", u16, l.peers, || 0u16),
+            $do!("what peers ask for", Asked, l.peers, || Asked::NONE),
             $do!("peers to send pages to", u16, l.peers, || 0u16),
             $do!("peers to send rays to", u16, l.peers, || 0u16),
         )
@@ -116,7 +119,7 @@ impl<'m> NodeMemory<'m> {
         let t = terms!(limits, take);
         let (bundle, lane, tiles, rays, ray_links, pages, wanted, ready) = (t.0, t.1, t.2, t.3, t.4, t.5, t.6, t.7);
         let (partials, partial_links, owed, owing) = (t.8, t.9, t.10, t.11);
-        let (peers, answers, serves, sends) = (t.12, t.13, t.14, t.15);
+        let (peers, answers, asked, turns, sends) = (t.12, t.13, t.14, t.15, t.16);
         Ok(Self {
             bundle: &mut bundle[0],
             lane,
@@ -125,7 +128,8 @@ impl<'m> NodeMemory<'m> {
             partials: Slab::new(partials, partial_links),
             owed,
             owing: Ring::new(owing),
-            peers: Peers::new(peers, Ring::new(answers), Ring::new(serves), Ring::new(sends)),
+            peers: Peers::new(peers, Ring::new(answers), Ring::new(sends)),
+            server: PageServer::new(asked, turns),
         })
     }
 }

@@ -23,7 +23,7 @@ pub use store::{All, Backing, Cache, Charged, Landed, Own, Place as CachePlace, 
 pub(crate) use peers::{PeerState, Peers};
 
 use crate::policy::{Choice, LinkCost, Policy, Situation, decide};
-use crate::send;
+use crate::{rules, send};
 use hybray_bintree::walk::{FROM_ROOT, Hit};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::Ray;
@@ -326,7 +326,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 self.handle_rays(from, view);
             }
             Message::Share { with } if from == self.dispatcher && !self.stopped => self.share(with),
-            Message::Fetch { page } => self.memory.peers.fetch(from, page),
+            Message::Fetch { page } => self.memory.server.fetch(from, page),
             Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
             _ => {}
         }
@@ -341,9 +341,9 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             return;
         }
         let outbox = self.memory.peers.send(with, 0);
+        let mut given = 0;
         if let Stage::Shading { sample, next, mut end } = self.stage {
             let most = (end - next).div_ceil(2).min(usize::from(self.settings.granularity));
-            let mut given = 0;
             for at in (next..end).rev() {
                 if given == most {
                     break;
@@ -365,6 +365,9 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
             self.stage = Stage::Shading { sample, next, end };
         }
+        if let Some(peer) = self.memory.peers.get(with) {
+            peer.none_to_share = given == 0;
+        }
     }
 
     /// What is in work is lost; what was done is still told.
@@ -378,16 +381,22 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.report = true;
     }
 
-    /// A peer is gone. Rays that were there, or on their way, are gone with it, and nobody knows whose: the tiles that
-    /// are open here are traced again, under a new epoch. Pages come from their home from now on.
+    /// A peer is gone. Rays that were there are gone with it, and nobody knows whose: the tiles that are open here are
+    /// traced again, under a new epoch. Pages come from their home from now on. Rays that were on their way there wait
+    /// here again: they may be of such a tile's new epoch, if their node heard of the loss before this one did.
     pub fn lost(&mut self, peer: Peer) {
         let Some(state) = self.memory.peers.get(peer) else { return };
         state.lost = true;
         state.full = false;
         let mut lists = [core::mem::take(&mut state.outbox), core::mem::take(&mut state.flight)];
         for list in &mut lists {
-            while self.memory.pool.pop(list).is_some() {}
+            while let Some(ray) = self.memory.pool.pop(list) {
+                let here = self.store.page(ray.page).is_some();
+                // Its place was free this moment.
+                let _ = self.memory.pool.push(ray, here);
+            }
         }
+        self.memory.server.lost(peer);
         if let Some(owed) = self.memory.owed.get_mut(usize::from(peer)) {
             let mut owed = core::mem::take(owed);
             while self.memory.partials.pop_front(&mut owed).is_some() {}
@@ -447,12 +456,15 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
             units += 1;
             if let Some(ray) = self.aside.take() {
-                self.aside = if at_hand(&scene, ray.page) {
+                let here = at_hand(&scene, ray.page);
+                self.aside = if here {
                     lane.take(&scene, &mut walker, ray, &mut sums, &mut counts)
                 } else {
                     pool.push(ray, false).err()
                 };
-                if self.aside.is_some_and(|ray| !at_hand(&scene, ray.page)) && pool.free() == 0 {
+                if self.aside.is_some_and(|ray| rules::lane_waits(at_hand(&scene, ray.page), pool.free())) {
+                    // Who only waits has nothing to do, and must not keep the processor busy with it.
+                    units -= u32::from(!here);
                     break;
                 }
                 continue;
@@ -479,9 +491,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     let (place, went) = (&places[next], &walked[next]);
                     let tile = self.in_work.tiles[usize::from(place.tile)];
                     let ray = primary(frame, &rays[next], place, &went.best, sample, tile, self.me);
-                    match went.needs {
-                        // It may have come since the bundle was traced.
-                        Some(page) => self.aside = pool.push(RayRecord { page, ..ray }, at_hand(&scene, page)).err(),
+                    // What it needs may have come since the bundle was traced, and what it hit may have gone.
+                    let hit = went.best.candidate.is_hit() && !at_hand(&scene, went.best.page);
+                    let waits = match went.needs {
+                        Some(page) => Some(RayRecord { page, ..ray }),
+                        None => hit.then_some(RayRecord { page: went.best.page, settled: 1, ..ray }),
+                    };
+                    match waits {
+                        Some(ray) => self.aside = pool.push(ray, at_hand(&scene, ray.page)).err(),
                         None => lane.start(&scene, &ray, &went.best, &mut sums, &mut counts),
                     }
                     self.stage = Stage::Shading { sample, next: next + 1, end };
@@ -515,7 +532,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 Stage::Idle if bundles == 1 => break,
                 Stage::Idle => {
                     let room = pool.capacity() == 0
-                        || (pool.len() < self.settings.in_system as usize && pool.free() >= pool.capacity() / 2);
+                        || rules::may_begin(pool.len(), pool.capacity(), self.settings.in_system as usize);
                     let begun = if room { begin(picture, &self.runs, sums.tiles, self.settings.bundle_tiles) } else { None };
                     let Some(begun) = begun else {
                         units -= 1;
@@ -551,7 +568,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         if self.memory.pool.capacity() > 0 {
             sent |= self.answer(link);
             sent |= self.pay(link);
-            sent |= self.serve(link);
+            let store = &self.store;
+            let (parts, pages) = self.memory.server.serve(link, &|page| store.bytes(page));
+            self.traffic.served += pages;
+            sent |= parts;
             self.decide(now);
             sent |= self.ask(link);
             sent |= self.forward(link, now);
@@ -565,7 +585,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             self.done.pop_front();
             sent = true;
         }
-        if self.helped && self.idle && self.memory.pool.len() == 0 {
+        if rules::says_idle(self.helped, self.idle, self.memory.pool.len()) {
             self.helped = !send(link, self.dispatcher, &Message::Idle);
             sent |= !self.helped;
         }
@@ -642,7 +662,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     self.memory.pool.move_to(page, outbox);
                 }
                 Choice::Fetch => {
-                    if !self.request(page, false) && owner.full && situation.owner_traces {
+                    let has_place = self.request(page, false);
+                    if rules::goes_again(has_place, owner.full, situation.owner_traces) {
                         // No place for the page either: the owner is asked once more.
                         let outbox = self.memory.peers.send(entry.owner, now);
                         self.memory.pool.move_to(page, outbox);
@@ -654,11 +675,11 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
 
     /// Reserves a place for `page`, and has it asked for.
     fn request(&mut self, page: u32, for_lane: bool) -> bool {
-        let limit = if for_lane { REQUESTS_MAX + 1 } else { usize::from(self.settings.requests).clamp(1, REQUESTS_MAX) };
         if self.requests.iter().any(|r| r.page == page) {
             return true;
         }
-        if self.requests.len() >= limit {
+        let requests = usize::from(self.settings.requests).clamp(1, REQUESTS_MAX);
+        if !rules::may_request(self.requests.len(), requests, REQUESTS_MAX, for_lane) {
             return false;
         }
         let owner = self.scene.resident.directory.entries[page as usize].owner;

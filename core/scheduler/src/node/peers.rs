@@ -1,10 +1,7 @@
-//! What a node knows of its peers: rays that are to go to each, those on their way, and what each has asked for.
+//! What a node knows of its peers: rays that are to go to each, and those on their way.
 
 use hybray_arena::{List, Ring};
 use hybray_link::Peer;
-
-/// Pages that a peer may have asked for and not been sent.
-pub const FETCHES: usize = 2;
 
 /// One peer.
 #[derive(Clone, Copy, Debug)]
@@ -15,21 +12,16 @@ pub struct PeerState {
     pub flight: List,
     /// When the first of the outbox came in, nanoseconds.
     pub since: u64,
-    /// Pages that it asked for: the first `fetches`.
-    pub pages: [u32; FETCHES],
-    /// How many.
-    pub fetches: u8,
-    /// Bytes of the first that have been sent.
-    pub sent: u32,
     /// Rays that wait there, as it said last.
     pub load: u16,
     /// It had no room for rays the last time.
     pub full: bool,
     /// It is gone.
     pub lost: bool,
+    /// It was to be given a share, and there was none: to be told.
+    pub none_to_share: bool,
     /// Whether its last rays were taken: to be told.
     pub answer: Option<bool>,
-    serving: bool,
     sending: bool,
 }
 
@@ -39,14 +31,11 @@ impl PeerState {
         outbox: List::EMPTY,
         flight: List::EMPTY,
         since: 0,
-        pages: [0; FETCHES],
-        fetches: 0,
-        sent: 0,
         load: 0,
         full: false,
         lost: false,
+        none_to_share: false,
         answer: None,
-        serving: false,
         sending: false,
     };
     /// One that is gone.
@@ -57,7 +46,6 @@ impl PeerState {
 pub struct Peers<'m> {
     all: &'m mut [PeerState],
     answers: Ring<'m, Peer>,
-    serves: Ring<'m, Peer>,
     sends: Ring<'m, Peer>,
 }
 
@@ -66,10 +54,9 @@ impl<'m> Peers<'m> {
     pub fn new(
         all: &'m mut [PeerState],
         answers: Ring<'m, Peer>,
-        serves: Ring<'m, Peer>,
         sends: Ring<'m, Peer>,
     ) -> Self {
-        Self { all, answers, serves, sends }
+        Self { all, answers, sends }
     }
 
     /// What is known of a peer.
@@ -106,46 +93,6 @@ impl<'m> Peers<'m> {
     /// How many are to be answered.
     pub fn answers(&self) -> usize {
         self.answers.len()
-    }
-
-    /// `peer` asks for a page; what is beyond its due is not heard.
-    pub fn fetch(&mut self, peer: Peer, page: u32) {
-        let Some(state) = self.all.get_mut(usize::from(peer)) else { return };
-        if usize::from(state.fetches) < FETCHES {
-            state.pages[usize::from(state.fetches)] = page;
-            state.fetches += 1;
-            if !core::mem::replace(&mut state.serving, true) {
-                let _ = self.serves.push_back(peer);
-            }
-        }
-    }
-
-    /// Peers that wait for pages.
-    pub fn serves(&self) -> usize {
-        self.serves.len()
-    }
-
-    /// The next peer that waits for a page, the page, and how much of it has been sent.
-    pub fn next_serve(&self) -> Option<(Peer, u32, u32)> {
-        let peer = *self.serves.front()?;
-        let state = &self.all[usize::from(peer)];
-        Some((peer, state.pages[0], state.sent))
-    }
-
-    /// So much more of it was sent; `whole` ends it. The next peer's turn.
-    pub fn served(&mut self, bytes: u32, whole: bool) {
-        let Some(peer) = self.serves.pop_front() else { return };
-        let state = &mut self.all[usize::from(peer)];
-        state.sent += bytes;
-        if whole {
-            state.sent = 0;
-            state.fetches -= 1;
-            state.pages.rotate_left(1);
-        }
-        state.serving = state.fetches > 0;
-        if state.serving {
-            let _ = self.serves.push_back(peer);
-        }
     }
 
     /// Rays are to go to `peer`; its outbox is returned, to put them in.

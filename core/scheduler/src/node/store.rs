@@ -4,6 +4,7 @@
 //! among the others the one that was not used for longest goes (second chance). The last place is kept aside for the
 //! lane, so that one ray can always be finished on the spot (DESIGN section 2, law 3).
 
+use crate::rules::{self, PlaceState};
 use core::cell::Cell;
 use hybray_scene::{Line, PageView, Pages, Tables, lines_for};
 
@@ -135,6 +136,14 @@ pub struct Place {
 impl Place {
     /// A place without a page.
     pub const FREE: Self = Self { page: NOWHERE, landed: 0, used: Cell::new(false) };
+
+    fn state(&self) -> PlaceState {
+        match (self.page, self.landed) {
+            (NOWHERE, _) => PlaceState::Free,
+            (_, WHOLE) => PlaceState::Whole,
+            _ => PlaceState::Landing,
+        }
+    }
 }
 
 const NOWHERE: u32 = u32::MAX;
@@ -254,7 +263,7 @@ impl<B: Backing> Store for Cache<'_, B> {
         }
         let places = self.places.len();
         let Some(common) = places.checked_sub(1) else { return false };
-        let can_go = |place: &Place| place.page == NOWHERE || (place.landed == WHOLE && !keep(place.page));
+        let can_go = |place: &Place| rules::can_go(place.state(), place.page != NOWHERE && keep(place.page));
         // Second chance: the hand goes round twice at most.
         let mut found = None;
         for _ in 0..2 * common {
@@ -269,9 +278,8 @@ impl<B: Backing> Store for Cache<'_, B> {
                 break;
             }
         }
-        // Whoever else waits for the page in the lane's place waits on: the lane must come on.
-        let lanes = |place: &Place| place.page == NOWHERE || place.landed == WHOLE;
-        let found = found.or_else(|| (for_lane && places > 0 && lanes(&self.places[common])).then_some(common));
+        let lanes = || for_lane && rules::lane_can_have(self.places[common].state());
+        let found = found.or_else(|| lanes().then_some(common));
         let Some(place) = found else { return false };
         self.free(place);
         self.places[place] = Place { page, landed: 0, used: Cell::new(true) };
@@ -291,12 +299,14 @@ impl<B: Backing> Store for Cache<'_, B> {
         }
         let size = self.sizes[page as usize].bytes as usize;
         let line = self.line(place);
-        let in_order = offset == self.places[place].landed as usize && !part.is_empty() && offset + part.len() <= size;
+        // From the start again if its sender was lost, and its home sends it.
+        let goes_on = offset == 0 || offset == self.places[place].landed as usize;
+        let in_order = goes_on && !part.is_empty() && offset + part.len() <= size;
         if !in_order || !self.backing.write(page, line, offset, part) {
             self.free(place);
             return Landed::Refused;
         }
-        self.places[place].landed += part.len() as u32;
+        self.places[place].landed = (offset + part.len()) as u32;
         if offset + part.len() < size {
             return Landed::Part;
         }

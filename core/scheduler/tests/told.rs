@@ -1,0 +1,73 @@
+//! Whoever was to be given a share is told what became of it, and says when there is nothing to do again: else the
+//! dispatcher would never have anybody share with it again (decision 15).
+
+#[path = "../examples/toy/mod.rs"]
+mod toy;
+
+use hybray_arena::{Arena, LINE_BYTES};
+use hybray_geometry::simd::Kernels;
+use hybray_link::{Event, HOST, Link, Peer};
+use hybray_scheduler::{All, Limits, Node, NodeMemory, Settings};
+use hybray_wire::{Message, View, decode};
+use toy::{SCENE_HASH, Toy};
+
+/// Messages that were sent.
+#[derive(Default)]
+struct Sent(Vec<(Peer, Message)>);
+
+impl Link for Sent {
+    fn me(&self) -> Peer {
+        1
+    }
+    fn peers(&self) -> Peer {
+        3
+    }
+    fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
+        let mut room = vec![0; bytes_max];
+        let bytes = write(&mut room);
+        self.0.push((to, decode(&room[..bytes]).expect("a node makes sense").message));
+        true
+    }
+    fn receive(&mut self, _: &mut dyn FnMut(Event<'_>)) -> bool {
+        false
+    }
+    fn wait(&mut self, _: u64) {}
+}
+
+/// What node 1 sends after `message` from `from`, besides its greetings.
+fn check(from: Peer, message: Message, expected: &[(Peer, Message)]) {
+    let toy = Toy::new();
+    let pages = toy.open();
+    let limits = Limits { peers: 3, pages: 1, rays: 8, tiles: 4, partials: 4 };
+    let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
+    let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
+    let (scene, settings) = (toy.scene(&pages), Settings::default());
+    let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
+    let mut link = Sent::default();
+    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
+    node.poll(&mut link, 0);
+    link.0.clear();
+    let body = vec![0; message.body_bytes()];
+    node.handle(from, &View { message, body: &body });
+    for now in 1..4 {
+        node.step(&mut || 0);
+        node.poll(&mut link, now);
+    }
+    assert_eq!(link.0, expected);
+}
+
+#[test]
+fn who_refuses_rays_says_when_it_is_idle() {
+    let told = [(2, Message::Took { taken: false, load: 0 }), (HOST, Message::Idle)];
+    check(2, Message::Rays { rays: 9, shadows: 0, load: 0 }, &told);
+}
+
+#[test]
+fn who_has_nothing_to_share_says_so() {
+    check(HOST, Message::Share { with: 2 }, &[(2, Message::Rays { rays: 0, shadows: 0, load: 0 })]);
+}
+
+#[test]
+fn who_is_given_nothing_says_that_it_is_idle() {
+    check(2, Message::Rays { rays: 0, shadows: 0, load: 0 }, &[(HOST, Message::Idle)]);
+}

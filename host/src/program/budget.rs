@@ -1,0 +1,118 @@
+//! Nodes with a budget, for every command that has them: what fits, and what people are told if it does not.
+
+use super::args::TreeArgs;
+use crate::partition::{Fit, NoFit, Wanted, page_bytes_for};
+use crate::prepare::Prepared;
+use anyhow::{Result, bail};
+use hybray_scheduler::policy::Policy;
+use hybray_scheduler::{PlanError, Sizes};
+use hybray_tracer::Scene;
+
+/// A farm of nodes with a budget, before it is known whether a scene fits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Farm<'a> {
+    pub nodes: u16,
+    /// Of each node, bytes.
+    pub memory: u64,
+    pub policy: Policy,
+    /// Nodes that the command can have.
+    pub nodes_most: u16,
+    pub tree: &'a TreeArgs,
+    /// Whether the scene is a packed one, whose pages are as large as they are.
+    pub packed: bool,
+}
+
+/// What is enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Least {
+    /// For as many nodes: whole KiB each, one less would not do.
+    pub memory: Option<u64>,
+    /// With as much memory each: one less would not do.
+    pub nodes: Option<u16>,
+}
+
+impl Farm<'_> {
+    /// Finds owners and the plan.
+    ///
+    /// # Errors
+    /// If the scene does not fit: one line that says which arguments would do.
+    pub fn fit(&self, prepared: &Prepared, scene: &Scene<'_>) -> Result<Fit> {
+        let wanted = self.wanted(scene);
+        match wanted.fit(&prepared.packed.placed_pages(), prepared.packed.voxels()) {
+            Ok(fit) => Ok(fit),
+            Err(NoFit::Plan(PlanError::Memory { .. })) => {
+                bail!(
+                    "{} is less than each of {} needs for this scene: {}",
+                    memory(self.memory),
+                    nodes(self.nodes),
+                    self.remedies(&wanted)
+                )
+            }
+            Err(_) => bail!(
+                "the scene has {} bytes of pages, too many for {} with {}: {}",
+                wanted.sizes.pages_bytes,
+                nodes(self.nodes),
+                memory(self.memory),
+                self.remedies(&wanted)
+            ),
+        }
+    }
+
+    /// What is enough for this scene.
+    pub fn least(&self, scene: &Scene<'_>) -> Least {
+        let wanted = self.wanted(scene);
+        Least { memory: wanted.least_memory(), nodes: wanted.least_nodes(self.nodes_most) }
+    }
+
+    fn wanted(&self, scene: &Scene<'_>) -> Wanted {
+        Wanted { sizes: Sizes::of(scene), nodes: self.nodes, memory: self.memory, policy: self.policy }
+    }
+
+    fn remedies(&self, wanted: &Wanted) -> String {
+        let least = Least { memory: wanted.least_memory(), nodes: wanted.least_nodes(self.nodes_most) };
+        let [memory, nodes] = self.arguments(least);
+        let mut remedies = match (memory, nodes) {
+            (Some(memory), Some(nodes)) => format!("give {memory}, or {nodes}"),
+            (Some(memory), None) => format!("give {memory}"),
+            (None, Some(nodes)) => format!("give {nodes}"),
+            (None, None) => "no node has so much memory".to_owned(),
+        };
+        let smaller = page_bytes_for(self.memory, self.nodes);
+        if self.packed && wanted.sizes.page_bytes_max > smaller as usize {
+            remedies += &format!("; less may do if it is packed with --page-bytes {smaller}");
+        }
+        remedies
+    }
+
+    /// The arguments that do. Where other nodes would get pages of another size, the size is said, too: the figures are
+    /// those of these pages.
+    pub fn arguments(&self, least: Least) -> [Option<String>; 2] {
+        let pages = |memory, nodes| {
+            let now = page_bytes_for(self.memory, self.nodes);
+            let free = self.tree.page_bytes.is_none() && !self.packed;
+            if free && page_bytes_for(memory, nodes) != now { format!(" --page-bytes {now}") } else { String::new() }
+        };
+        [
+            least.memory.map(|m| format!("{}{}", memory(m), pages(m, self.nodes))),
+            least.nodes.map(|n| format!("--nodes {n}{}", pages(self.memory, n))),
+        ]
+    }
+}
+
+fn nodes(nodes: u16) -> String {
+    format!("{nodes} node{}", if nodes == 1 { "" } else { "s" })
+}
+
+/// `--memory 32MiB`: the argument, in the largest unit that says it exactly.
+pub(super) fn memory(bytes: u64) -> String {
+    format!("--memory {}", size(bytes))
+}
+
+/// `32MiB`, in the largest unit that says it exactly.
+pub(super) fn size(bytes: u64) -> String {
+    let (unit, name) = [(1 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")]
+        .into_iter()
+        .find(|&(unit, _)| bytes > 0 && bytes.is_multiple_of(unit))
+        .unwrap_or((1, ""));
+    format!("{}{name}", bytes / unit)
+}

@@ -1,0 +1,125 @@
+//! `hybray plan`: what each node's memory would be spent on, before anything is drawn.
+
+use super::args::PlanArgs;
+use super::budget::{Farm, Least, size};
+use super::report::{PlanReport, ReportFile};
+use super::{End, prepare};
+use crate::pack::is_packed;
+use crate::partition::{Fit, page_bytes_for};
+use crate::simulate::runs::name_of;
+use anyhow::Result;
+use hybray_scheduler::Sizes;
+use hybray_simulated::NODES_MAX;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+/// The JSON report: `docs/REPORT.md` describes it.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    scene: &'a str,
+    nodes: u16,
+    memory: u64,
+    scheduler: &'static str,
+    pages: usize,
+    page_bytes: u64,
+    page_bytes_max: usize,
+    voxels: u32,
+    #[serde(flatten)]
+    plan: PlanReport,
+    least_memory: Option<u64>,
+    least_nodes: Option<u16>,
+    warnings: &'a [String],
+}
+
+pub(super) fn run(args: &PlanArgs) -> Result<End> {
+    let json = args.json.as_deref().map(ReportFile::create).transpose()?;
+    let page_bytes = page_bytes_for(args.memory, args.nodes);
+    let (prepared, _) = prepare(&args.scene, &args.tree, None, page_bytes)?;
+    let pages = prepared.packed.open()?;
+    let scene = prepared.scene(&pages);
+    let farm = Farm {
+        nodes: args.nodes,
+        memory: args.memory,
+        policy: args.scheduler,
+        nodes_most: NODES_MAX,
+        tree: &args.tree,
+        packed: is_packed(&args.scene.scene),
+    };
+    let fit = farm.fit(&prepared, &scene)?;
+    let (sizes, least) = (Sizes::of(&scene), farm.least(&scene));
+    let report = Report {
+        scene: &args.scene.scene,
+        nodes: args.nodes,
+        memory: args.memory,
+        scheduler: name_of(args.scheduler),
+        pages: sizes.pages,
+        page_bytes: sizes.pages_bytes,
+        page_bytes_max: sizes.page_bytes_max,
+        voxels: prepared.packed.voxels(),
+        plan: PlanReport::of(&fit),
+        least_memory: least.memory,
+        least_nodes: least.nodes,
+        warnings: &prepared.warnings,
+    };
+    if args.json.as_deref() != Some(Path::new("-")) {
+        prepared.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        std::io::stdout().lock().write_all(table(&report, &fit, &farm, least).as_bytes())?;
+    }
+    if let Some(json) = json {
+        json.write(&report)?;
+    }
+    Ok(End::Done)
+}
+
+fn table(report: &Report<'_>, fit: &Fit, farm: &Farm<'_>, least: Least) -> String {
+    let mut text = String::new();
+    let mut line = |arguments: std::fmt::Arguments<'_>| {
+        // A string takes everything.
+        let _ = writeln!(text, "{arguments}");
+    };
+    let names = report.plan.terms.iter().map(|term| term.name.len()).max().unwrap_or(0);
+    let s = |count: u64| if count == 1 { "" } else { "s" };
+    line(format_args!("{:<names$} {:>9} {:>9} {:>13}", "each node has", "count", "each", "bytes"));
+    for term in &report.plan.terms {
+        line(format_args!("{:<names$} {:>9} {:>9} {:>13}", term.name, term.count, term.bytes_each, term.bytes));
+    }
+    line(format_args!("{:<names$} {:>33}", "in all", report.plan.total_bytes));
+    line(format_args!(
+        "{:<names$} {:>33}",
+        format!("not needed of {}", size(report.memory)),
+        report.memory - report.plan.total_bytes
+    ));
+    line(format_args!(""));
+    line(format_args!(
+        "scene      {}: {} page{} of {} bytes at most, {} bytes in all, in {} voxel{}",
+        report.scene,
+        report.pages,
+        s(report.pages as u64),
+        report.page_bytes_max,
+        report.page_bytes,
+        report.voxels,
+        s(u64::from(report.voxels))
+    ));
+    line(format_args!("scheduler  {}", report.scheduler));
+    let [least_owned, most_owned] = [report.plan.owned_bytes_least, report.plan.owned_bytes_most];
+    let holds = if fit.plan.holds_all {
+        "has room for all others, too".to_owned()
+    } else {
+        let places = report.plan.cache_places;
+        format!("has a cache of {places} place{} for others", s(places as u64))
+    };
+    line(format_args!("each node  owns {least_owned} to {most_owned} bytes of pages, and {holds}"));
+    let [memory, nodes] = farm.arguments(least);
+    let unless = |text: Option<String>| text.unwrap_or_else(|| "nothing".to_owned());
+    line(format_args!(
+        "enough     {} for {} node{}; {} with {} each",
+        unless(memory),
+        report.nodes,
+        s(u64::from(report.nodes)),
+        unless(nodes),
+        size(report.memory)
+    ));
+    text
+}

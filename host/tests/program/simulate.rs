@@ -1,0 +1,77 @@
+//! `hybray simulate` as people meet it.
+
+use super::{Folder, talk};
+use serde_json::Value;
+
+fn runs(folder: &Folder, arguments: &str) -> Vec<Value> {
+    let (_, out) = folder.succeed(&format!("simulate {arguments} -q --json -"));
+    let report: Value = serde_json::from_slice(&out).unwrap();
+    report["runs"].as_array().unwrap().clone()
+}
+
+/// Several schedulers in one report, one film; a packed scene is the same scene, and its runs are the same to the digit.
+#[test]
+fn schedulers_side_by_side_and_packed_scenes() {
+    let folder = Folder::new();
+    let more = "--machine powerxplorer --nodes 1,4,8 --memory 256KiB --size 40x32 --spp 1 \
+                --scheduler hybrid,hybrid-1995,data-parallel,demand-driven";
+    let (_, out) = folder.succeed("render spd:balls:4 --size 40x32 --spp 1 -q -o a.png --json -");
+    let film = serde_json::from_slice::<Value>(&out).unwrap()["film"].clone();
+    let all = runs(&folder, &format!("spd:balls:4 {more}"));
+    let names: Vec<_> =
+        all.iter().map(|run| (run["scheduler"].as_str().unwrap(), run["nodes"].as_u64().unwrap())).collect();
+    let expected: Vec<_> = ["hybrid", "hybrid-1995", "data-parallel", "demand-driven"]
+        .into_iter()
+        .flat_map(|name| [1, 4, 8].map(|nodes| (name, nodes)))
+        .collect();
+    assert_eq!(names, expected);
+    for run in &all {
+        assert_eq!(run["film"], film, "{run}");
+        if run["nodes"] != 1 {
+            assert!(run["memory_high_water"].as_u64().unwrap() <= 256 * 1024, "{run}");
+        }
+    }
+    // The pages that were chosen for the budget, packed.
+    folder.succeed("pack spd:balls:4 -q -o b.hyb --page-bytes 4096");
+    assert_eq!(
+        runs(&folder, &format!("b.hyb {more}")),
+        runs(&folder, &format!("spd:balls:4 {more} --page-bytes 4096"))
+    );
+}
+
+#[test]
+fn how_nodes_work_changes_the_run_and_not_the_film() {
+    let folder = Folder::new();
+    let usual =
+        "spd:balls:3 --machine gigabit --nodes 4 --memory 128KiB --size 64x64 --spp 1 --scheduler data-parallel";
+    let first = &runs(&folder, usual)[0];
+    for more in ["--granularity 2", "--in-system 20", "--pyramid 8", "--voxels 2x2x1", "--page-bytes 8192"] {
+        let run = &runs(&folder, &format!("{usual} {more}"))[0];
+        assert_eq!(run["film"], first["film"], "{more}");
+        assert_ne!(run["events"], first["events"], "{more} changed nothing");
+    }
+}
+
+#[test]
+fn mistakes() {
+    let folder = Folder::new();
+    let check = |arguments: &str, code: i32, words: &[&str]| {
+        let output = folder.run(&format!("simulate {arguments}"));
+        let said = talk(&output);
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(code), 0), "{arguments}: {said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{arguments}: {said}");
+    };
+    check("spd:balls:1 --nodes 2", 2, &["--machine"]);
+    check("spd:balls:1 --machine threads", 2, &["--nodes"]);
+    check("spd:balls:1 --machine abacus --nodes 2", 2, &["abacus", "powerxplorer", "serial-115200"]);
+    check("spd:balls:1 --machine threads --nodes 4097", 2, &["4097", "1..=4096"]);
+    check("spd:balls:1 --machine threads --nodes 2 --scheduler hybrid,fifo", 2, &["fifo", "demand-driven"]);
+    check(
+        "spd:balls:1 --machine threads --nodes 2 --memory 9KiB -q",
+        1,
+        &["--memory 9KiB", "2 nodes", "give --memory"],
+    );
+    check("spd:balls:1 --machine threads --nodes 2 --json - --csv -", 1, &["only one", "standard output"]);
+    check("nosuch.nff --machine threads --nodes 2", 1, &["nosuch.nff", "no such file"]);
+    assert!(folder.names().is_empty());
+}

@@ -1,0 +1,303 @@
+//! Simulated runs: collected, each made once, all cores at work.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
+
+use hybray::build::Settings as Build;
+use hybray::model::Settings as Wanted;
+use hybray::prepare::Prepared;
+use hybray::simulate::runs::{Experiment, RunError};
+use hybray_scheduler::policy::Policy;
+use hybray_scheduler::{Options, Outcome, Sizes};
+use hybray_simulated::{Machine, NodeRun, SimulateError, Simulated};
+use hybray_tests::scene;
+use rayon::prelude::*;
+
+/// One run: a scene, cut in some way, on a machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Job {
+    /// A built-in scene.
+    pub scene: String,
+    /// As `--voxels` has it; `1` is the scene in one piece.
+    pub voxels: String,
+    /// Most bytes of a page.
+    pub page_bytes: usize,
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// The machine.
+    pub machine: &'static str,
+    /// Nodes.
+    pub nodes: u16,
+    /// Scheduler.
+    pub policy: Policy,
+    /// Memory of a node, MiB; without it every node has the scene.
+    pub memory_mib: Option<u64>,
+    /// A node has page memory for the scene's pages divided by this.
+    pub share: Option<u64>,
+    /// Node 1 gives out tiles, not the host.
+    pub is_dispatched_by_node: bool,
+    /// T, if it is not learned.
+    pub spread: Option<u8>,
+    /// Least tiles of a run, if they are not learned.
+    pub atomic: Option<u32>,
+    /// Rays in a message, if it is not the default.
+    pub granularity: Option<u16>,
+    /// Rays that wait in a node before it begins a tile, if it is not the default.
+    pub in_system: Option<u32>,
+    /// Tiles of a pyramid, if it is not the default.
+    pub bundle_tiles: Option<u8>,
+}
+
+impl Job {
+    /// A run of the 1995 report with the default scheduler: 256 x 256 pixels, one sample, nodes of 32 MB.
+    pub fn of_1995(scene: &str, nodes: u16) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            voxels: "1".to_owned(),
+            page_bytes: Build::default().page_bytes,
+            size: [256, 256],
+            samples: 1,
+            machine: "powerxplorer",
+            nodes,
+            policy: Policy::Hybrid,
+            memory_mib: Some(32),
+            share: None,
+            is_dispatched_by_node: false,
+            spread: None,
+            atomic: None,
+            granularity: None,
+            in_system: None,
+            bundle_tiles: None,
+        }
+    }
+
+    /// The same with page memory for the scene's pages divided by `share`, in pages of 4 KiB.
+    pub fn with_share(self, share: u64) -> Self {
+        Self { share: Some(share), page_bytes: 4096, ..self }
+    }
+
+    /// The same by a scheduler of the report, with its grid of voxels and the settings of its table 6.1.
+    pub fn as_published(self, policy: Policy, grid: &str) -> Self {
+        let in_system = Some(9000 / u32::from(self.nodes));
+        Self { policy, voxels: format!("{grid}x1"), granularity: Some(100), in_system, bundle_tiles: Some(4), ..self }
+    }
+
+    /// One node with the same constants and unlimited memory (DESIGN section 12).
+    fn alone(&self) -> Self {
+        Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, ..self.clone() }
+    }
+}
+
+/// What a run took.
+#[derive(Clone, Debug, Default)]
+pub struct Figures {
+    /// Virtual seconds.
+    pub seconds: f64,
+    /// Busy over total time (equation 6.2), 0 to 1.
+    pub busy: f64,
+    /// Until pages are in place, virtual seconds.
+    pub loading_seconds: f64,
+    /// Until the film is at the host, virtual seconds.
+    pub gathering_seconds: f64,
+    /// Frames that nodes sent.
+    pub messages: u64,
+    /// Bytes that nodes sent.
+    pub bytes: u64,
+    /// Times that a ray went from one node to another.
+    pub forwarded: u64,
+    /// Messages with rays.
+    pub ray_messages: u64,
+    /// Pages that came to nodes.
+    pub fetched: u64,
+    /// Rays started.
+    pub rays: u64,
+    /// Least and most rays started or taken over by a node, over their mean.
+    pub balance: [f64; 2],
+    /// What the scene's pages take.
+    pub scene_bytes: u64,
+    /// The node that needed most, bytes.
+    pub memory_high_water: u64,
+    film: u64,
+}
+
+impl Figures {
+    fn of(run: &Simulated, scene_bytes: u64) -> Self {
+        let sum = |of: &dyn Fn(&NodeRun) -> u64| run.nodes.iter().map(of).sum::<u64>();
+        let ray_messages = run.kinds.iter().find(|(kind, _)| *kind == "rays").map_or(0, |(_, (frames, _))| *frames);
+        let computing = |node: &NodeRun| node.computing_ns as f64;
+        let mean = run.nodes.iter().map(computing).sum::<f64>() / run.nodes.len() as f64;
+        let least = run.nodes.iter().map(computing).fold(f64::INFINITY, f64::min);
+        let most = run.nodes.iter().map(computing).fold(0.0, f64::max);
+        let fixed = run.plan.sum().total_bytes() - run.plan.lines as u64 * 64;
+        Self {
+            seconds: run.time_ns as f64 * 1e-9,
+            busy: run.busy(),
+            loading_seconds: run.loading_ns as f64 * 1e-9,
+            gathering_seconds: run.gathering_ns as f64 * 1e-9,
+            messages: sum(&|node| node.traffic.sent_frames),
+            bytes: sum(&|node| node.traffic.sent_bytes),
+            forwarded: sum(&|node| node.exchange.forwarded),
+            ray_messages,
+            fetched: sum(&|node| node.exchange.fetched),
+            rays: run.operations().rays,
+            balance: [least / mean, most / mean],
+            scene_bytes,
+            memory_high_water: run.nodes.iter().map(|node| fixed + node.high_water.page_bytes).max().unwrap_or(0),
+            film: run.film,
+        }
+    }
+}
+
+/// Why there are no figures.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Without {
+    /// They are not made yet.
+    NotYet,
+    /// The scene does not fit: `o.m.` in the papers' tables.
+    Memory,
+    /// It went wrong.
+    Failed(String),
+}
+
+impl Without {
+    /// For a table.
+    pub fn cell(&self) -> String {
+        match self {
+            Self::NotYet => String::new(),
+            Self::Memory => "o.m.".to_owned(),
+            Self::Failed(_) => "failed".to_owned(),
+        }
+    }
+}
+
+type Found = Result<Figures, Without>;
+
+/// A run beside that of one node.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// The run.
+    pub run: Figures,
+    /// Time of one node over its time.
+    pub speedup: f64,
+    /// The same, divided by the nodes.
+    pub efficiency: f64,
+}
+
+/// Runs that are wanted, and those that are made.
+#[derive(Default)]
+pub struct Bench {
+    is_small: bool,
+    wanted: RefCell<Vec<Job>>,
+    known: Vec<(Job, Found)>,
+}
+
+impl Bench {
+    /// One whose pictures have 16 x 16 pixels: whether everything runs, not what it measures.
+    #[cfg(test)]
+    pub fn small() -> Self {
+        Self { is_small: true, ..Self::default() }
+    }
+
+    /// The figures of `job`, and of the one-node run beside it; notes what is not known yet.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn compared(&self, job: &Job) -> Result<Compared, Without> {
+        let (alone, run) = (self.figures(&job.alone()), self.figures(job));
+        let (alone, run) = (alone?, run?);
+        let speedup = alone.seconds / run.seconds;
+        Ok(Compared { run, speedup, efficiency: speedup / f64::from(job.nodes) })
+    }
+
+    /// The figures of `job`; notes it if they are not known yet.
+    ///
+    /// # Errors
+    /// If there are none.
+    pub fn figures(&self, job: &Job) -> Found {
+        let job = if self.is_small { Job { size: [16, 16], samples: 1, ..job.clone() } } else { job.clone() };
+        let known = self.known.iter().find(|(known, _)| *known == job);
+        known.map(|(_, found)| found.clone()).unwrap_or_else(|| {
+            self.wanted.borrow_mut().push(job);
+            Err(Without::NotYet)
+        })
+    }
+
+    /// Makes all runs that are wanted. Those of a scene that is cut in the same way share its pages.
+    pub fn run(&mut self) {
+        let mut scenes: BTreeMap<_, Vec<Job>> = BTreeMap::new();
+        for job in self.wanted.take() {
+            let jobs = scenes.entry((job.scene.clone(), job.voxels.clone(), job.page_bytes)).or_default();
+            if !jobs.contains(&job) {
+                jobs.push(job);
+            }
+        }
+        let scenes: Vec<_> = scenes.into_values().collect();
+        let found: Vec<_> = scenes.into_par_iter().flat_map_iter(|jobs| of_scene(&jobs)).collect();
+        self.known.extend(found);
+    }
+
+    /// How many runs there are.
+    pub fn len(&self) -> usize {
+        self.known.len()
+    }
+
+    /// What failed, and pictures that are not those of the other runs of a scene (law 1).
+    pub fn wrong(&self) -> Vec<String> {
+        let mut films: HashMap<_, u64> = HashMap::new();
+        let mut wrong = Vec::new();
+        for (job, found) in &self.known {
+            match found {
+                Ok(run) => {
+                    let film = *films.entry((&job.scene, job.size, job.samples)).or_insert(run.film);
+                    if film != run.film {
+                        wrong.push(format!("another picture: {job:?}"));
+                    }
+                    if job.memory_mib.is_some_and(|mib| run.memory_high_water > mib << 20) {
+                        wrong.push(format!("over its budget: {job:?}"));
+                    }
+                }
+                Err(Without::Failed(why)) => wrong.push(format!("{why}: {job:?}")),
+                Err(_) => {}
+            }
+        }
+        wrong
+    }
+}
+
+fn of_scene(jobs: &[Job]) -> Vec<(Job, Found)> {
+    let first = &jobs[0];
+    let voxels = first.voxels.parse().unwrap_or_else(|e| panic!("{}: {e}", first.voxels));
+    let build = Build { page_bytes: first.page_bytes, voxels, ..Build::default() };
+    let prepared = Prepared::new(scene(&first.scene), &build).unwrap_or_else(|e| panic!("{}: {e}", first.scene));
+    jobs.par_iter().map(|job| (job.clone(), made(job, &prepared))).collect()
+}
+
+fn made(job: &Job, prepared: &Prepared) -> Found {
+    let failed = |why: String| Without::Failed(why);
+    let pages = prepared.packed.open().map_err(|e| failed(e.to_string()))?;
+    let scene = prepared.scene(&pages);
+    let wanted = Wanted { size: Some(job.size), spp: Some(job.samples), ..Wanted::default() };
+    let frame = prepared.frame(&prepared.cameras[0], &wanted);
+    let machine = Machine::named(job.machine).ok_or_else(|| failed(format!("no machine {}", job.machine)))?;
+    let mut experiment = Experiment::new(prepared, &scene, &frame, machine);
+    experiment.dispatcher = job.is_dispatched_by_node.into();
+    experiment.options = Options { spread: job.spread.map(f32::from), atomic: job.atomic };
+    let settings = machine.settings(job.policy);
+    experiment.settings = hybray_scheduler::Settings {
+        granularity: job.granularity.unwrap_or(settings.granularity),
+        in_system: job.in_system.unwrap_or(settings.in_system),
+        bundle_tiles: job.bundle_tiles.unwrap_or(settings.bundle_tiles),
+        ..settings
+    };
+    let scene_bytes = Sizes::of(&scene).pages_bytes;
+    experiment.memory = job.memory_mib.map(|mib| mib << 20);
+    experiment.page_memory = job.share.map(|share| scene_bytes / share);
+    match experiment.simulated(job.nodes, &mut |_| true) {
+        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run, scene_bytes)),
+        Ok(run) => Err(failed(format!("{:?}", run.outcome))),
+        Err(RunError::Misfit(_) | RunError::Simulate(SimulateError::Plan(_))) => Err(Without::Memory),
+        Err(error) => Err(failed(error.to_string())),
+    }
+}

@@ -1,0 +1,212 @@
+//! Chapter 6 of the 1995 report.
+
+use anyhow::Result;
+use hybray_scheduler::policy::Policy;
+
+use crate::bench::{Bench, Job};
+use crate::published::{Published, Row};
+use crate::table::{Table, megabytes, per_cent};
+
+/// What is said of a simulated run, six columns.
+const RUN: [&str; 6] = ["s", "speed-up", "eff. %", "busy %", "messages", "MB"];
+/// A cell of an experiment that cannot be made, and why is said on the page.
+const NOT_SIMULATED: &str = "not simulated";
+
+/// The cells of `job`, as [`RUN`] has them.
+fn run(bench: &Bench, job: &Job) -> Vec<String> {
+    match bench.compared(job) {
+        Ok(found) => vec![
+            format!("{:.2}", found.run.seconds),
+            format!("{:.2}", found.speedup),
+            per_cent(found.efficiency),
+            per_cent(found.run.busy),
+            found.run.messages.to_string(),
+            megabytes(found.run.bytes),
+        ],
+        Err(without) => cells(&without.cell()),
+    }
+}
+
+/// A group of cells of which the first says why the others are empty.
+fn cells(first: &str) -> Vec<String> {
+    let mut cells = vec![String::new(); RUN.len()];
+    first.clone_into(&mut cells[0]);
+    cells
+}
+
+/// The head of a table: first columns, then a group for each of `groups`.
+fn table(first: &[&str], groups: &[&str]) -> Table {
+    let mut names: Vec<String> = first.iter().map(|&name| name.to_owned()).collect();
+    for group in groups {
+        names.push(format!("{group}: {}", RUN[0]));
+        names.extend(RUN[1..].iter().map(|&name| name.to_owned()));
+    }
+    Table::new(&names.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// Table 6.2: which nodes are given tiles, and when.
+pub fn criteria(bench: &Bench, published: &Published) -> Result<String> {
+    let first = ["criterion", "demand-driven nodes", "pixel count: s", "busy %", "dynamic: s", "busy %"];
+    let mut table = table(&first, &["`hybrid-1995`", "`hybrid`"]);
+    for row in published.table("t6_2_scheduling_criteria")? {
+        let mut cells_of_row = columns(
+            row,
+            &["criterion", "demand_driven_processes", "pixel_count_s", "pixel_count_eff", "dynamic_s", "dynamic_eff"],
+        )?;
+        if row.text("criterion")? == "all processes" {
+            let job = Job::of_1995("paper:balls", 16);
+            cells_of_row.extend(run(bench, &job.clone().as_published(Policy::Hybrid1995, "4x4")));
+            cells_of_row.extend(run(bench, &job));
+        } else {
+            cells_of_row.extend(cells(NOT_SIMULATED));
+            cells_of_row.extend(cells("–"));
+        }
+        table.row(cells_of_row);
+    }
+    Ok(table.finish())
+}
+
+/// Table 6.3: subhosts and the size of a pyramid.
+pub fn subhosts(bench: &Bench, published: &Published) -> Result<String> {
+    let first = ["model", "subhosts", "8 x 8: s", "busy %", "16 x 16: s", "busy %"];
+    let groups = ["`hybrid-1995`, 8 x 8", "`hybrid-1995`, 16 x 16", "`hybrid`, 8 x 8", "`hybrid`, 16 x 16"];
+    let mut table = table(&first, &groups);
+    for row in published.table("t6_3_subhosts")? {
+        let mut line = columns(row, &["model", "subhosts", "s_8x8", "eff_8x8", "s_16x16", "eff_16x16"])?;
+        // Every node clips for itself: as many subhosts as nodes.
+        if row.number("subhosts")? == 16 {
+            let job = Job::of_1995(&format!("paper:{}", row.text("model")?), 16);
+            for policy in [Policy::Hybrid1995, Policy::Hybrid] {
+                for tiles in [1, 4] {
+                    let published = job.clone().as_published(policy, "4x4");
+                    let job = if policy == Policy::Hybrid { job.clone() } else { published };
+                    line.extend(run(bench, &Job { bundle_tiles: Some(tiles), ..job }));
+                }
+            }
+        } else {
+            (0..groups.len()).for_each(|_| line.extend(cells(NOT_SIMULATED)));
+        }
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// Table 6.4: balls.
+pub fn balls(bench: &Bench, published: &Published) -> Result<String> {
+    scaling(bench, published, "t6_4_balls", "paper:balls")
+}
+
+/// Table 6.5: teapot.
+pub fn teapot(bench: &Bench, published: &Published) -> Result<String> {
+    scaling(bench, published, "t6_5_teapot", "paper:teapot")
+}
+
+fn scaling(bench: &Bench, published: &Published, name: &str, scene: &str) -> Result<String> {
+    let first = ["nodes", "no subhosts: s", "busy %", "subhosts: s", "busy %"];
+    let mut table = table(&first, &["`hybrid-1995`", "`hybrid`"]);
+    for row in published.table(name)? {
+        let mut line = columns(row, &["processors", "no_subhosts_s", "no_subhosts_eff", "subhosts_s", "subhosts_eff"])?;
+        line.extend(both(bench, &Job::of_1995(scene, row.number("processors")?), Policy::Hybrid1995, row)?);
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// `policy` as published, and `hybrid`.
+fn both(bench: &Bench, job: &Job, policy: Policy, row: &Row) -> Result<Vec<String>> {
+    let mut cells = run(bench, &job.clone().as_published(policy, row.text("grid")?));
+    cells.extend(run(bench, job));
+    Ok(cells)
+}
+
+/// Table 6.6: light caches.
+pub fn light_cache(bench: &Bench, published: &Published) -> Result<String> {
+    let first = ["model", "nodes", "with: s", "busy %", "without: s", "busy %"];
+    let mut table = table(&first, &["`hybrid-1995`, without", "`hybrid`"]);
+    for row in published.table("t6_6_light_cache")? {
+        let mut line = columns(
+            row,
+            &["model", "processors", "with_cache_s", "with_cache_eff", "without_cache_s", "without_cache_eff"],
+        )?;
+        let job = Job::of_1995(&format!("paper:{}", row.text("model")?), row.number("processors")?);
+        line.extend(both(bench, &job, Policy::Hybrid1995, row)?);
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// Table 6.7: data parallel alone.
+pub fn data_parallel(bench: &Bench, published: &Published) -> Result<String> {
+    let mut table = table(&["nodes", "paper: s", "busy %"], &["`data-parallel`", "`hybrid`"]);
+    for row in published.table("t6_7_data_parallel")? {
+        let mut line = columns(row, &["processors", "s", "eff"])?;
+        let job = Job::of_1995("paper:balls", row.number("processors")?);
+        line.extend(both(bench, &job, Policy::DataParallel, row)?);
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// Table 6.8: how much of the balls reflects.
+pub fn reflectivity(bench: &Bench, published: &Published) -> Result<String> {
+    let first = ["level", "hybrid of 1995: s", "busy %", "data parallel: s", "busy %"];
+    let mut table = table(&first, &["`hybrid-1995`", "`data-parallel`", "`hybrid`"]);
+    for row in published.table("t6_8_reflectivity")? {
+        let mut line = columns(row, &["level", "hybrid_s", "hybrid_eff", "data_parallel_s", "data_parallel_eff"])?;
+        let job = Job::of_1995(&format!("paper:balls:{}", row.text("level")?), 16);
+        for policy in [Policy::Hybrid1995, Policy::DataParallel] {
+            line.extend(run(bench, &job.clone().as_published(policy, "4x4")));
+        }
+        line.extend(run(bench, &job));
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// Table 6.9, balls with 66,430 spheres.
+pub fn balls5(bench: &Bench, published: &Published) -> Result<String> {
+    large(bench, published, "balls5", "paper:balls5", 16)
+}
+
+/// Table 6.9, the conference room with 8 and 30 lights.
+pub fn conference(bench: &Bench, published: &Published) -> Result<String> {
+    let eight = large(bench, published, "conference8", "paper:conference", 4)?;
+    let thirty = large(bench, published, "conference30", "paper:conference:30", 4)?;
+    Ok(format!("8 lights:\n\n{eight}\n30 lights:\n\n{thirty}"))
+}
+
+fn large(bench: &Bench, published: &Published, name: &str, scene: &str, share: u64) -> Result<String> {
+    let first = ["nodes", "data parallel: s", "hybrid of 1995: s"];
+    let mut table = table(&first, &["`data-parallel`", "`hybrid-1995`", "`hybrid`"]);
+    let columns_of = [format!("{name}_dp_s"), format!("{name}_hybrid_s")];
+    for row in published.table("t6_9_large_models")? {
+        let nodes = row.number("processors")?;
+        if nodes == 1 {
+            continue;
+        }
+        let mut line = columns(row, &["processors", &columns_of[0], &columns_of[1]])?;
+        let job = Job::of_1995(scene, nodes).with_share(share);
+        for policy in [Policy::DataParallel, Policy::Hybrid1995] {
+            line.extend(run(bench, &job.clone().as_published(policy, grid(nodes))));
+        }
+        line.extend(run(bench, &job));
+        table.row(line);
+    }
+    Ok(table.finish())
+}
+
+/// The grids of the other tables; the report does not say what that of 24 processors was.
+fn grid(nodes: u16) -> &'static str {
+    match nodes {
+        2 => "1x2",
+        4 => "2x2",
+        8 => "2x4",
+        16 => "4x4",
+        24 => "4x6",
+        _ => "4x8",
+    }
+}
+
+fn columns(row: &Row, names: &[&str]) -> Result<Vec<String>> {
+    names.iter().map(|name| row.cell(name)).collect()
+}

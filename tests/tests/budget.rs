@@ -1,0 +1,160 @@
+//! Nodes with a budget: the picture is that of nodes that have everything, whatever the budget, the policy and the owners;
+//! and what a plan says would do does, by no line less.
+
+use hybray::build;
+use hybray::model;
+use hybray::prepare::Prepared;
+use hybray_native::{Budget, DispatcherAt, Farm, plan, trace, trace_within};
+use hybray_scheduler::policy::Policy;
+use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings, Sizes};
+use hybray_tests::{Random, kernels, scene, within};
+use hybray_tracer::Scene;
+use hybray_wire::Counts;
+
+/// Bytes of a line of memory: budgets are counted in them.
+const LINE: u64 = 64;
+
+/// Draws a scene on farms with every policy, and with the least memory that will do and half as much again.
+fn check(name: &str, page_bytes: usize, samples: u32) {
+    let prepared = Prepared::new(scene(name), &build::Settings { page_bytes, ..build::Settings::default() })
+        .unwrap_or_else(|e| panic!("{name}: {e}"));
+    let opened = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
+    let scene = prepared.scene(&opened);
+    let pages = prepared.packed.page_slices();
+    let size = Some([96, 64]);
+    let wanted = model::Settings { size, spp: Some(samples), depth: Some(4), ..model::Settings::default() };
+    let frame = prepared.frame(&prepared.cameras[0], &wanted);
+    let farm = |nodes, dispatcher| Farm { nodes, kernels: kernels(), dispatcher, options: Options::default() };
+    let expected =
+        trace(&scene, prepared.hash, &frame, &farm(1, DispatcherAt::Host), &mut |_| true).expect("a picture");
+    let seed = name.bytes().fold(page_bytes as u64, |seed, byte| seed.wrapping_mul(31) + u64::from(byte));
+    let random = &mut Random(seed);
+    for nodes in [1, 2, 3, 7] {
+        let owners: Vec<u16> = pages.iter().map(|_| random.below(nodes) as u16 + 1).collect();
+        let nodes = nodes as u16;
+        for (_, policy) in Policy::ALL {
+            let least = least(&scene, &owners, nodes, policy);
+            for memory in [least, least + least / 2] {
+                let dispatcher = [DispatcherAt::Host, DispatcherAt::Node][random.below(2)];
+                let steps = [16, 4096][random.below(2)];
+                let settings = Settings { policy, steps, ..Settings::default() };
+                let budget = Budget { memory, owners: &owners, pages: &pages, settings };
+                let what =
+                    || format!("{name}, seed {seed}, {nodes} nodes, {dispatcher:?}, {memory} bytes, {settings:?}");
+                let traced = within(60, what, || {
+                    let farm = farm(nodes, dispatcher);
+                    trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut |_| true)
+                });
+                let traced = traced.unwrap_or_else(|e| panic!("{}: {e}", what())).expect("a picture");
+                assert_eq!((traced.outcome, traced.film), (Outcome::Finished, expected.film), "{}", what());
+                assert_eq!(counts(&traced.nodes), counts(&expected.nodes), "{}", what());
+                for node in &traced.worked {
+                    let high = node.high_water;
+                    let all = [high.rays, high.partials, high.tiles, high.requests];
+                    assert!(all.iter().all(|(most, limit)| most <= limit), "{}: {high:?}", what());
+                    assert!(high.page_bytes <= memory, "{}: {high:?}", what());
+                    assert_eq!(node.traffic.nonsense, 0, "{}", what());
+                }
+            }
+        }
+    }
+}
+
+fn counts(nodes: &[hybray_scheduler::NodeReport]) -> Counts {
+    let mut counts = Counts::default();
+    nodes.iter().for_each(|node| counts += node.counts);
+    counts
+}
+
+/// The least memory that will do, as the refusal of less says.
+fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+    let mut entries = scene.resident.directory.entries.to_vec();
+    entries.iter_mut().zip(owners).for_each(|(entry, &owner)| entry.owner = owner);
+    let mut owned = *scene;
+    owned.resident.directory.entries = &entries;
+    let least = needed(plan(&owned, nodes, 0, policy)).expect("nothing is too little");
+    let fits = plan(&owned, nodes, least, policy).unwrap_or_else(|e| panic!("{nodes} nodes: {e}"));
+    assert!(fits.sum().total_bytes() <= least, "{fits:?}");
+    assert_eq!(needed(plan(&owned, nodes, least - LINE, policy)), Some(least), "{nodes} nodes");
+    assert_eq!(needed(plan(&owned, nodes, least / 2, policy)), Some(least), "{nodes} nodes");
+    least
+}
+
+fn needed(plan: Result<Plan, PlanError>) -> Option<u64> {
+    match plan {
+        Err(PlanError::Memory { needed, .. } | PlanError::Pages { needed, .. }) => Some(needed),
+        Ok(_) => None,
+    }
+}
+
+#[test]
+fn balls() {
+    check("spd:balls:2", 4096, 2);
+    check("spd:balls:2", 16_384, 1);
+}
+
+#[test]
+fn glass() {
+    check("spd:teapot:3", 4096, 1);
+    check("spd:teapot:3", 16_384, 1);
+}
+
+#[test]
+fn mirrors() {
+    check("cornell:mirror", 4096, 2);
+    check("cornell:mirror", 16_384, 1);
+}
+
+#[test]
+fn meshes_without_end() {
+    check("organic:2000", 4096, 1);
+    check("organic:2000", 16_384, 1);
+}
+
+#[test]
+fn many_lights() {
+    check("paper:vase", 4096, 1);
+    check("paper:vase", 16_384, 1);
+}
+
+/// Even shares, for scenes and budgets of all sizes: what is refused says what would do, and no less would.
+#[test]
+fn a_refusal_says_what_would_do() {
+    let random = &mut Random(11);
+    let (mut too_few, mut not_even_a_node, mut none) = (0, 0, 0);
+    for round in 0..4000 {
+        let (pages_log2, nodes_log2) = (1 + random.below(14), random.below(9));
+        let pages = 1 + random.below(1 << pages_log2);
+        let page_bytes_max = LINE as usize * (1 + random.below(1024));
+        let pages_bytes = LINE * (0..pages.min(64)).map(|_| 1 + random.below(page_bytes_max / 64) as u64).sum::<u64>();
+        let pages_bytes = (pages_bytes * pages as u64 / pages.min(64) as u64 / LINE * LINE).max(page_bytes_max as u64);
+        let directory_nodes = 1 + pages / 4;
+        let (materials, lights) = (random.below(100), random.below(40));
+        let sizes = Sizes { pages, pages_bytes, page_bytes_max, directory_nodes, materials, lights };
+        let (nodes, policy) = (1 + random.below(1 << nodes_log2) as u16, Policy::ALL[random.below(4)].1);
+        let memory = random.bits() % (1 << (10 + random.below(20)));
+        let plan = |nodes, memory| Plan::new(sizes, nodes, memory, None, policy);
+        let what = format!("round {round}: {sizes:?}, {nodes} nodes of {memory} bytes, {policy:?}");
+        match plan(nodes, memory) {
+            Ok(plan) => assert!(plan.sum().total_bytes() <= memory, "{what}: {plan:?}"),
+            Err(error) => {
+                let needed = needed(Err(error)).expect("a refusal");
+                let fits = plan(nodes, needed).unwrap_or_else(|e| panic!("{what}: {needed} should do: {e}"));
+                assert!(fits.sum().total_bytes() <= needed, "{what}: {fits:?}");
+                assert!(plan(nodes, needed - LINE).is_err(), "{what}: less than {needed} does too");
+                match error {
+                    PlanError::Memory { .. } => not_even_a_node += 1,
+                    PlanError::Pages { nodes_needed: 0, .. } => none += 1,
+                    PlanError::Pages { nodes_needed: needed, .. } => {
+                        too_few += 1;
+                        assert!(needed > u64::from(nodes), "{what}: {needed}");
+                        assert!(plan(needed as u16, memory).is_ok(), "{what}: {needed} nodes should do");
+                        assert!(plan(needed as u16 - 1, memory).is_err(), "{what}: less than {needed} nodes do too");
+                    }
+                }
+            }
+        }
+    }
+    let seen = [too_few, not_even_a_node, none];
+    assert!(seen.iter().all(|&count| count > 50), "some of each kind: {seen:?}");
+}

@@ -1,0 +1,312 @@
+//! Random schedules on the simulated farm: whatever is drawn, the film is the same, and no limit is passed.
+//!
+//! A seed draws everything: scene, nodes, owners, memory, policy and its settings, the machine and its network, delays, and
+//! in every third seed faults. What was drawn is printed when something is wrong, and `HYBRAY_SEED=n` runs that seed alone.
+//! `cargo xtask soak` runs thousands (`HYBRAY_SEEDS`, from `HYBRAY_FIRST` on).
+
+use hybray::build;
+use hybray::model;
+use hybray::partition::{Voxels, owners};
+use hybray::prepare::Prepared;
+use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
+use hybray_scheduler::policy::{LinkCost, Policy};
+use hybray_scheduler::{Options, Outcome, PlanError, Settings};
+use hybray_simulated::{
+    Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_spoiled,
+};
+use hybray_tests::{Random, kernels, scene, within};
+use hybray_tracer::Scene;
+use hybray_wire::{Counts, Frame};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Seeds in the gate.
+const SEEDS: u64 = 300;
+/// Every so many seeds one is run twice.
+const TWICE: u64 = 10;
+const NAMES: [&str; 7] =
+    ["spd:balls:1", "spd:teapot:2", "cornell:mirror", "spd:gears:1", "spd:mount:2", "organic:400", "spd:rings:1"];
+const PAGE_BYTES: [usize; 3] = [1024, 4096, 16_384];
+const SIZES: [([u32; 2], u32, u32); 3] = [([24, 24], 1, 4), ([40, 24], 2, 3), ([64, 48], 1, 2)];
+
+/// A scene in pages of one size, and what it looks like.
+struct Drawn {
+    name: String,
+    prepared: Prepared,
+    /// Frames, their films, and what is traced for them.
+    frames: Vec<(Frame, u64, Counts)>,
+}
+
+impl Drawn {
+    fn all() -> Vec<Self> {
+        let cuts = [Voxels::One, Voxels::Grid([2, 2, 1]), Voxels::Adaptive(5)];
+        let all =
+            NAMES.iter().flat_map(|name| PAGE_BYTES.iter().zip(cuts).map(move |(&bytes, cut)| (name, bytes, cut)));
+        all.map(|(name, page_bytes, voxels)| {
+            let settings = build::Settings { page_bytes, voxels, ..build::Settings::default() };
+            let prepared = Prepared::new(scene(name), &settings).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let pages = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
+            let farm = Threads {
+                nodes: 1,
+                kernels: kernels(),
+                dispatcher: DispatcherAt::Host,
+                options: Options { spread: Some(1.0), atomic: None },
+            };
+            let frames = SIZES.map(|(size, samples, depth)| {
+                let (size, spp, depth) = (Some(size), Some(samples), Some(depth));
+                let wanted = model::Settings { size, spp, depth, ..model::Settings::default() };
+                let frame = prepared.frame(&prepared.cameras[0], &wanted);
+                let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).expect(name);
+                assert_eq!(traced.outcome, Outcome::Finished, "{name}");
+                (frame, traced.film, traced.nodes[0].counts)
+            });
+            drop(pages);
+            let name = format!("{name} in {page_bytes}");
+            Self { name, prepared, frames: frames.to_vec() }
+        })
+        .collect()
+    }
+}
+
+/// Something that happens to the network.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    Cut { a: u16, b: u16, from_ns: u64, until_ns: u64 },
+    Lose { node: u16, at_ns: u64, notice_ns: u64 },
+}
+
+/// What a seed draws beside its scene.
+#[derive(Debug)]
+struct Draw {
+    machine: Machine,
+    nodes: u16,
+    dispatcher: u16,
+    settings: Settings,
+    options: Options,
+    /// Bytes, and who owns which page; every node has everything if there are none.
+    budget: Option<(u64, Vec<u16>)>,
+    delays: Option<(u64, u64)>,
+    faults: Vec<Fault>,
+}
+
+fn one_of<T: Copy>(random: &mut Random, values: &[T]) -> T {
+    values[random.below(values.len())]
+}
+
+fn network(random: &mut Random, nodes: u16, machine: &Machine) -> NetworkModel {
+    let topologies = [
+        Topology::Crossbar,
+        Topology::Mesh2d { columns: 1 + random.below(usize::from(nodes)) as u16 },
+        Topology::Chain,
+        Topology::Bus,
+    ];
+    let link = |random: &mut Random| LinkModel {
+        latency_ns: machine.network.link.latency_ns * one_of(random, &[0, 1, 1, 10]) / one_of(random, &[1, 1, 5]),
+        bytes_per_second: (machine.network.link.bytes_per_second / one_of(random, &[1, 1, 10])).max(1),
+    };
+    NetworkModel {
+        topology: one_of(random, &topologies),
+        link: link(random),
+        host_link: link(random),
+        room_frames: one_of(random, &[1, 1, 2, 3, 8]),
+    }
+}
+
+/// The least memory that will do.
+fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+    let mut entries = scene.resident.directory.entries.to_vec();
+    entries.iter_mut().zip(owners).for_each(|(entry, &owner)| entry.owner = owner);
+    let mut owned = *scene;
+    owned.resident.directory.entries = &entries;
+    match plan(&owned, nodes, 0, policy) {
+        Err(PlanError::Memory { needed, .. } | PlanError::Pages { needed, .. }) => needed,
+        Ok(plan) => panic!("nothing is enough: {plan:?}"),
+    }
+}
+
+impl Draw {
+    fn new(random: &mut Random, drawn: &Drawn, scene: &Scene<'_>, faulty: bool) -> Self {
+        let nodes = one_of(random, &[1, 2, 2, 3, 4, 5, 7, 8, 13, 16, 32, 64]);
+        let mut machine = one_of(random, &MACHINES);
+        machine.network = network(random, nodes, &machine);
+        let policy = Policy::ALL[random.below(4)].1;
+        let usual = machine.settings(policy);
+        let settings = Settings {
+            granularity: one_of(random, &[1, 7, 30, 100, 186, 1000]),
+            deadline_ns: usual.deadline_ns * one_of(random, &[0, 1, 1, 20]),
+            steps: one_of(random, &[1, 2, 16, 16, 300, 4096]),
+            bundle_tiles: one_of(random, &[1, 4]),
+            in_system: one_of(random, &[1, 64, 4096]),
+            requests: one_of(random, &[1, 2, 8, 16]),
+            link: one_of(random, &[usual.link, LinkCost { message_ns: 1, byte_ps: 1 }]),
+            ..usual
+        };
+        let options = Options { spread: one_of(random, &[None, Some(1.0), Some(8.0)]), atomic: None };
+        let budget = (random.below(8) > 0).then(|| Self::budget(random, drawn, scene, nodes, policy));
+        let message_ns = usual.deadline_ns / 8;
+        let delays = (random.below(2) == 0).then(|| (random.bits(), message_ns * one_of(random, &[1, 10])));
+        let mut draw = Self {
+            machine,
+            nodes,
+            dispatcher: one_of(random, &[0, 0, 1]),
+            settings,
+            options,
+            budget,
+            delays,
+            faults: Vec::new(),
+        };
+        if faulty {
+            draw.spoil(random, message_ns);
+        }
+        draw
+    }
+
+    fn budget(random: &mut Random, drawn: &Drawn, scene: &Scene<'_>, nodes: u16, policy: Policy) -> (u64, Vec<u16>) {
+        let count = drawn.prepared.packed.pages();
+        let any = |random: &mut Random| 1 + random.below(usize::from(nodes)) as u16;
+        let only = any(random);
+        let owners = match random.below(4) {
+            0 => (0..count).map(|page| 1 + (page % usize::from(nodes)) as u16).collect(),
+            1 => vec![only; count],
+            2 => {
+                let packed = &drawn.prepared.packed;
+                owners(&packed.placed_pages(), packed.voxels(), nodes, u64::MAX).expect("room for all")
+            }
+            _ => (0..count).map(|_| any(random)).collect(),
+        };
+        let least = least(scene, &owners, nodes, policy);
+        (least + least * one_of(random, &[0, 0, 0, 1, 4, 16]) / 16, owners)
+    }
+
+    /// Faults at moments of the picture: most take as long as it does, or are over before it begins.
+    fn spoil(&mut self, random: &mut Random, message_ns: u64) {
+        let peer = |random: &mut Random| random.below(usize::from(self.nodes) + 1) as u16;
+        let moment = |random: &mut Random| {
+            let most = message_ns * one_of(random, &[4, 40, 400]) + 100_000;
+            random.bits() % most
+        };
+        if random.below(3) == 0 {
+            self.delays = Some((random.bits(), 100 * message_ns));
+        }
+        for _ in 0..random.below(4) {
+            let (a, b, from_ns) = (peer(random), peer(random), moment(random));
+            self.faults.push(Fault::Cut { a, b, from_ns, until_ns: from_ns + 100 * moment(random) });
+        }
+        // The dispatcher's node is the farm's; one of the others, at least, is left.
+        let (first, nodes) = (1 + self.dispatcher, self.nodes);
+        let all: Vec<u16> = random.shuffled((first..=nodes).collect());
+        let most = usize::from(nodes).saturating_sub(1).min(all.len());
+        let lost = if most == 0 { 0 } else { random.below(most.min(4) + 1) };
+        for &node in &all[..lost] {
+            let (at_ns, notice_ns) = (moment(random), moment(random));
+            self.faults.push(Fault::Lose { node, at_ns, notice_ns });
+        }
+    }
+
+    fn run(&self, drawn: &Drawn, scene: &Scene<'_>, pages: &[&[u8]], frame: &Frame) -> Simulated {
+        let budget = self.budget.as_ref().map(|(memory, owners)| Budget { memory: *memory, page_memory: None, owners });
+        let Self { nodes, dispatcher, options, settings, .. } = *self;
+        let farm = Farm { machine: &self.machine, nodes, dispatcher, options, settings, budget };
+        let spoil = &mut |network: &mut Network| {
+            if let Some((seed, most_ns)) = self.delays {
+                network.delay(seed, most_ns);
+            }
+            for fault in &self.faults {
+                match *fault {
+                    Fault::Cut { a, b, from_ns, until_ns } => network.cut(a, b, from_ns, until_ns),
+                    Fault::Lose { node, at_ns, notice_ns } => network.lose(node, at_ns, notice_ns),
+                }
+            }
+        };
+        simulate_spoiled(scene, drawn.prepared.hash, pages, frame, &farm, spoil, &mut |_| true)
+            .unwrap_or_else(|e| panic!("{e}"))
+    }
+}
+
+/// Draws and runs one seed.
+fn check(seed: u64, all: &[Drawn]) {
+    let random = &mut Random(seed);
+    let drawn = &all[random.below(all.len())];
+    let (frame, film, counts) = drawn.frames[random.below(SIZES.len())];
+    let opened = drawn.prepared.packed.open().expect("pages");
+    let scene = drawn.prepared.scene(&opened);
+    let pages = drawn.prepared.packed.page_slices();
+    let draw = Draw::new(random, drawn, &scene, seed % 3 == 2);
+    let what = || {
+        let [width, height, samples] = [frame.width, frame.height, u32::from(frame.samples)];
+        format!("HYBRAY_SEED={seed}: {}, {width}x{height}, {samples} samples, {draw:?}", drawn.name)
+    };
+    let tried = catch_unwind(AssertUnwindSafe(|| {
+        within(600, what, || {
+            let run = draw.run(drawn, &scene, &pages, &frame);
+            expect(&run, &draw, film, &counts);
+            if seed % TWICE == 0 {
+                let again = draw.run(drawn, &scene, &pages, &frame);
+                assert_eq!((again.events, again.film), (run.events, run.film), "another time another history");
+                assert_eq!(again.nodes, run.nodes, "another time another history");
+            }
+        });
+    }));
+    if let Err(panic) = tried {
+        eprintln!("{}", what());
+        resume_unwind(panic);
+    }
+}
+
+fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts) {
+    let lost = draw.faults.iter().any(|fault| matches!(fault, Fault::Lose { .. }));
+    assert_eq!(run.outcome, Outcome::Finished);
+    assert_eq!(run.film, film, "another picture");
+    assert_eq!(run.refused_frames, 0);
+    for (number, node) in run.nodes.iter().enumerate() {
+        let high = node.high_water;
+        let limits = run.plan.limits;
+        let bounds = [(high.rays, limits.rays), (high.partials, limits.partials), (high.tiles, limits.tiles)];
+        for ((most, limit), planned) in bounds {
+            assert!(most <= limit && limit <= planned, "node {}: {most} of {limit}, planned {planned}", number + 1);
+        }
+        // More than the settings say: what the lane asked for stays asked for when its ray goes into the pool.
+        assert!(high.requests.0 <= high.requests.1, "{high:?}");
+        assert!(high.page_bytes <= 64 * run.plan.lines as u64, "node {}: {high:?}", number + 1);
+        assert_eq!(node.exchange.nonsense, 0, "node {}", number + 1);
+    }
+    if let Some((memory, _)) = draw.budget {
+        assert!(run.plan.sum().total_bytes() <= memory, "over budget: {:?}", run.plan);
+    }
+    if !lost {
+        let mut counts = Counts::default();
+        run.nodes.iter().for_each(|node| counts += node.report.counts);
+        assert_eq!(counts, *expected, "other rays");
+        let sum = |of: fn(&Simulated, usize) -> u64| (0..run.nodes.len()).map(|node| of(run, node)).sum::<u64>();
+        let forwarded = sum(|run, node| run.nodes[node].exchange.forwarded);
+        assert_eq!(forwarded, sum(|run, node| run.nodes[node].exchange.arrived), "rays that went nowhere");
+    }
+}
+
+fn variable(name: &str) -> Option<u64> {
+    let value = std::env::var(name).ok()?;
+    Some(value.parse().unwrap_or_else(|_| panic!("{name} is a number, not {value}")))
+}
+
+#[test]
+fn random_schedules() {
+    let (first, count) = match variable("HYBRAY_SEED") {
+        Some(seed) => (seed, 1),
+        None => (variable("HYBRAY_FIRST").unwrap_or(0), variable("HYBRAY_SEEDS").unwrap_or(SEEDS)),
+    };
+    let all = Drawn::all();
+    let next = AtomicU64::new(first);
+    std::thread::scope(|threads| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            threads.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    if seed >= first.saturating_add(count) {
+                        break;
+                    }
+                    check(seed, &all);
+                }
+            });
+        }
+    });
+}
