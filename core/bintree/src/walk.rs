@@ -2,9 +2,7 @@
 
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Candidate, LaneRay, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
-use hybray_scene::{
-    BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Slot, WIDTH,
-};
+use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Slot, WIDTH};
 
 /// The directory, and the pages at hand: all of them unless `P` says otherwise.
 #[derive(Debug)]

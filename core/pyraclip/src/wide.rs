@@ -9,7 +9,7 @@
 use hybray_bintree::walk::{Counts, Hit, Resident, STACK, Stack, Walk, Walked};
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, Kind, Node, PageView, Pages, Slot, WIDTH};
+use hybray_scene::{BLOCK, Child, Directory, Kind, Node, PageView, Pages, Slot, WIDTH};
 
 /// Rays of a bundle at most.
 pub const RAYS_MAX: usize = 256;
@@ -27,7 +27,7 @@ pub struct Leaf {
     pub near: f32,
     /// The page that it is in.
     pub page: u32,
-    /// [`Child::Leaf`], packed.
+    /// [`Child::Leaf`], packed; [`Child::Page`] if the page is not at hand.
     pub child: u32,
     /// Least corner of its box.
     pub lo: [f32; 3],
@@ -50,8 +50,8 @@ impl Scratch {
         Self { list: [NOTHING; LIST_MAX], waiting: [(0, 0); STACK] }
     }
 
-    /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet; `None` if there are more than 128, or if a
-    /// page that they are in is not at hand.
+    /// The ordered cliplist of `bundle`: every leaf that a ray of it may meet, and in place of the leaves of a page that is
+    /// not at hand the page itself; `None` if there are more than 128.
     pub fn clip<P: Pages + ?Sized>(
         &mut self,
         kernels: Kernels,
@@ -61,6 +61,73 @@ impl Scratch {
     ) -> Option<&[Leaf]> {
         let length = kernels.run(Clip { scene, bundle, scratch: self, counts })?;
         Some(&self.list[..length])
+    }
+}
+
+/// Pages that `bundle` meets, the nearest first, as far as `out` has room; returns how many. Only the directory is looked
+/// at: this is the cliplist of a node that has no pages yet (the 1995 report, chapter 4).
+pub fn pages(
+    kernels: Kernels,
+    directory: &Directory<'_>,
+    bundle: &Bundle,
+    out: &mut [(f32, u32)],
+    scratch: &mut Scratch,
+    counts: &mut Counts,
+) -> usize {
+    kernels.run(PagesMet { directory, bundle, out, scratch, counts })
+}
+
+struct PagesMet<'w, 'a> {
+    directory: &'w Directory<'a>,
+    bundle: &'w Bundle,
+    out: &'w mut [(f32, u32)],
+    scratch: &'w mut Scratch,
+    counts: &'w mut Counts,
+}
+
+impl Kernel for PagesMet<'_, '_> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> usize {
+        let Self { directory, bundle, out, scratch, counts } = self;
+        if directory.nodes.is_empty() {
+            return 0;
+        }
+        let waiting = &mut scratch.waiting;
+        waiting[0] = (0, DIRECTORY);
+        let (mut top, mut found) = (1, 0);
+        while top > 0 {
+            top -= 1;
+            let node = &directory.nodes[waiting[top].0 as usize];
+            counts.nodes += 1;
+            let (mut met, near) = bundle.meets(simd, &node.lo, &node.hi);
+            while met != 0 {
+                let slot = met.trailing_zeros() as usize & (WIDTH - 1);
+                met &= met - 1;
+                match Child::unpack(node.child[slot]) {
+                    Child::Inner(index) => {
+                        waiting[top] = (index, DIRECTORY);
+                        top += 1;
+                    }
+                    Child::Page(page) => {
+                        let mut at = found;
+                        found = (found + 1).min(out.len());
+                        // The farthest falls off the end.
+                        while at > 0 && out[at - 1].0 > near[slot] {
+                            if at < out.len() {
+                                out[at] = out[at - 1];
+                            }
+                            at -= 1;
+                        }
+                        if at < out.len() {
+                            out[at] = (near[slot], page);
+                        }
+                    }
+                    Child::Leaf { .. } | Child::Unused => {}
+                }
+            }
+        }
+        found
     }
 }
 
@@ -161,7 +228,7 @@ impl<P: Pages + ?Sized> Kernel for Clip<'_, '_, P> {
 /// The directory counts as a page of this number.
 const DIRECTORY: u32 = u32::MAX;
 
-/// Leaves that the bundle meets, in no order; how many, or `None` if they do not fit the list, or are not all at hand.
+/// Leaves and missing pages that the bundle meets, in no order; how many, or `None` if they do not fit the list.
 #[inline(always)]
 fn clip<S: Simd, P: Pages + ?Sized>(
     simd: S,
@@ -187,6 +254,7 @@ fn clip<S: Simd, P: Pages + ?Sized>(
             Child::Inner(index) => (&nodes[index as usize], page),
             Child::Page(page) => {
                 counts.pages += 1;
+                // Those that are not at hand stand on the list instead.
                 nodes = scene.pages.page(page)?.nodes;
                 (&nodes[0], page)
             }
@@ -198,8 +266,11 @@ fn clip<S: Simd, P: Pages + ?Sized>(
             let slot = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
             let child = node.child[slot];
-            if matches!(Child::unpack(child), Child::Leaf { .. }) {
+            let child_kind = Child::unpack(child);
+            let missing = matches!(child_kind, Child::Page(page) if scene.pages.page(page).is_none());
+            if missing || matches!(child_kind, Child::Leaf { .. }) {
                 let corner = |c: &[[f32; WIDTH]; 3]| [c[0][slot], c[1][slot], c[2][slot]];
+                let page = if let Child::Page(page) = child_kind { page } else { page };
                 *list.get_mut(length)? =
                     Leaf { near: near[slot], page, child, lo: corner(&node.lo), hi: corner(&node.hi) };
                 length += 1;
@@ -232,6 +303,8 @@ fn group<S: Simd, P: Pages + ?Sized>(
         return;
     };
     let mut best: [Hit; GROUP] = core::array::from_fn(|i| Hit::none(rays[i.min(rays.len() - 1)].t_max));
+    // Where each ray first enters a page that is not at hand; no number if it does not.
+    let mut missing = [f32::NAN; GROUP];
     let mut farthest = simd.load8(&best.map(|hit| hit.candidate.t));
     let mut stop = greatest(&best);
     for leaf in list {
@@ -244,15 +317,25 @@ fn group<S: Simd, P: Pages + ?Sized>(
         if met == 0 {
             continue;
         }
-        // The cliplist was made of pages at hand.
-        let Some(page) = scene.pages.page(leaf.page) else { continue };
+        let Some(page) = scene.pages.page(leaf.page) else {
+            for (lane, near) in near.to_array().into_iter().enumerate().filter(|(lane, _)| met >> lane & 1 != 0) {
+                missing[lane] = if missing[lane] <= near { missing[lane] } else { near };
+            }
+            continue;
+        };
         if self::leaf(simd, &lanes, &kernels, &page, leaf, met, &mut best, counts) {
             farthest = simd.load8(&best.map(|hit| hit.candidate.t));
             stop = greatest(&best);
         }
     }
-    for (walked, &best) in walked.iter_mut().zip(&best) {
-        *walked = Walked { best, needs: None };
+    for (lane, (ray, walked)) in rays.iter().zip(walked).enumerate() {
+        let best = best[lane];
+        *walked = if missing[lane] <= best.candidate.t {
+            // It finds for itself which page it needs first.
+            Walk::<false, P> { best, ..Walk::new(scene, ray, stack, counts) }.run(simd)
+        } else {
+            Walked { best, needs: None }
+        };
     }
 }
 

@@ -10,7 +10,7 @@ use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Bundle, Ray, Vec3};
 use hybray_pyraclip::wide::{self, RAYS_MAX, Scratch};
-use hybray_scene::{PageView, Pages, parents};
+use hybray_scene::{Child, PageView, Pages, parents};
 
 /// Some of a scene's pages.
 struct Share<'a> {
@@ -42,7 +42,7 @@ fn bundle(random: &mut Random, count: usize) -> Vec<Ray> {
 #[test]
 fn rays_of_a_bundle_go_on_where_their_pages_are() {
     let (mut scratch, mut stack, mut counts) = (Scratch::new(), Stack::new(), Counts::default());
-    let (mut needed, mut whole, mut hits, mut unlisted) = (0, 0, 0, 0);
+    let (mut needed, mut whole, mut hits, mut cut_short) = (0, 0, 0, 0);
     for seed in 0..10 {
         let mut random = Random(seed);
         let shapes = Shapes::new(mixed(200 + 150 * seed as usize, seed));
@@ -93,15 +93,24 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                     hits += usize::from(expected.candidate.is_hit());
                 }
                 if let Some(bundle) = Bundle::around(rays.iter(), magnitude) {
-                    // A list is of all the leaves that are met, or there is none.
+                    // A list has every leaf that is met, or the page that it is in.
                     let all = scratch.clip(kernels, &resident, &bundle, &mut counts).map(<[_]>::to_vec);
                     let some = scratch.clip(kernels, &scene, &bundle, &mut counts).map(<[_]>::to_vec);
-                    assert!(some.is_none() || some == all, "{what}");
-                    unlisted += usize::from(some.is_none() && all.is_some());
+                    if let (Some(all), Some(some)) = (all, some) {
+                        let is_page = |leaf: &wide::Leaf| matches!(Child::unpack(leaf.child), Child::Page(_));
+                        let missing: Vec<u32> = some.iter().filter(|leaf| is_page(leaf)).map(|leaf| leaf.page).collect();
+                        assert!(missing.iter().all(|&page| !store.here[page as usize]), "{what}");
+                        let (gone, kept): (Vec<_>, Vec<_>) = all.iter().partition(|leaf| missing.contains(&leaf.page));
+                        let listed: Vec<_> = some.iter().filter(|leaf| !is_page(leaf)).collect();
+                        assert_eq!(listed.len(), kept.len(), "{what}");
+                        assert!(kept.iter().all(|leaf| listed.contains(leaf)), "{what}");
+                        assert!(gone.iter().all(|leaf| !store.here[leaf.page as usize]), "{what}");
+                        cut_short += usize::from(!missing.is_empty());
+                    }
                 }
             }
         }
     }
-    println!("{needed} rays needed more, {whole} did not, {hits} hits; {unlisted} bundles without a list");
-    assert!(needed > 1000 && whole > 1000 && hits > 1000 && unlisted > 5, "{needed} {whole} {hits} {unlisted}");
+    println!("{needed} rays needed more, {whole} did not, {hits} hits; {cut_short} lists with pages");
+    assert!(needed > 1000 && whole > 1000 && hits > 1000 && cut_short > 5, "{needed} {whole} {hits} {cut_short}");
 }

@@ -24,6 +24,8 @@ const SPREAD_START: f32 = 2.5;
 const SPREAD_RANGE: (f32, f32) = (2.5, 16.0);
 /// A node with less of the mean rate than this is slow.
 const SLOW: f32 = 0.5;
+/// Nodes that one node shares with at a time: each takes half of what is left, and each word costs it time.
+const HELPERS: u32 = 2;
 /// A run should take this many times as long as its messages.
 const OVERHEAD_FACTOR: u64 = 2;
 
@@ -52,10 +54,18 @@ pub struct NodeState {
     lost: bool,
     /// Has been told that nothing is left.
     told: bool,
+    /// What is left of its part of the picture.
+    next: u32,
+    end: u32,
     /// Runs in its hands, the oldest first.
     runs: Runs,
-    /// It has nothing to do, and somebody was told to share with it.
-    helping: bool,
+    /// It has nothing to do, and this peer was told to share with it.
+    helping: Option<Peer>,
+    /// When it ended its last run, and how often it was told to share since.
+    since: u64,
+    asked: u32,
+    /// Nodes that it was told to share with, and that are not through with it.
+    helpers: u32,
     tiles_done: u64,
     nanoseconds: u64,
     /// When its first run was sent, to learn what a message costs.
@@ -98,8 +108,8 @@ pub struct Dispatcher<'m> {
     options: Options,
     /// Tiles of the picture; 0 until it begins.
     tiles: u32,
-    /// First tile that was never given out.
-    next: u32,
+    /// Each node begins in its own part of the picture.
+    biased: bool,
     again: heapless::Deque<Run, AGAIN_MAX>,
     /// More tiles to be given out again are on their way here.
     gathering: bool,
@@ -110,8 +120,6 @@ pub struct Dispatcher<'m> {
     /// Least time that a run's messages were seen to take.
     overhead: u64,
     asked: bool,
-    /// Who was last told to share.
-    shared: usize,
 }
 
 impl<'m> Dispatcher<'m> {
@@ -123,7 +131,7 @@ impl<'m> Dispatcher<'m> {
             nodes,
             options,
             tiles: 0,
-            next: 0,
+            biased: false,
             again: heapless::Deque::new(),
             gathering: false,
             cheapest: u64::MAX,
@@ -131,8 +139,13 @@ impl<'m> Dispatcher<'m> {
             runs_done: 0,
             overhead: u64::MAX,
             asked: false,
-            shared: 0,
         }
+    }
+
+    /// Whether each node begins in a part of the picture of its own: of use where it must ask for pages that it has not.
+    #[must_use]
+    pub fn biased(self, biased: bool) -> Self {
+        Self { biased, ..self }
     }
 
     /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
@@ -140,7 +153,7 @@ impl<'m> Dispatcher<'m> {
         match *message {
             Message::Begin(frame) if from == HOST => {
                 self.tiles = hybray_wire::TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
-                self.next = 0;
+                self.divide();
             }
             Message::Hello { .. } => {
                 if let Some(node) = self.nodes.get_mut(usize::from(from)) {
@@ -150,8 +163,9 @@ impl<'m> Dispatcher<'m> {
             Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
             Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
             Message::Idle => {
-                if let Some(node) = self.nodes.get_mut(usize::from(from)) {
-                    node.helping = false;
+                let helped = self.nodes.get_mut(usize::from(from)).and_then(|node| node.helping.take());
+                if let Some(helped) = helped.and_then(|helped| self.nodes.get_mut(usize::from(helped))) {
+                    helped.helpers = helped.helpers.saturating_sub(1);
                 }
             }
             _ => {}
@@ -202,6 +216,7 @@ impl<'m> Dispatcher<'m> {
         }
         node.runs.pop_front();
         node.tiles_done += u64::from(count);
+        (node.since, node.asked) = (now, 0);
         node.nanoseconds = node.nanoseconds.saturating_add(nanoseconds);
         if !node.measured {
             node.measured = true;
@@ -256,7 +271,7 @@ impl<'m> Dispatcher<'m> {
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.tiles > 0
-            && self.next == self.tiles
+            && self.left() == 0
             && self.again.is_empty()
             && !self.gathering
             && self.nodes.iter().all(|node| node.runs.is_empty())
@@ -286,7 +301,7 @@ impl<'m> Dispatcher<'m> {
     /// be through with it first.
     fn ends_too_late(&self, peer: usize, crew: &Crew, atomic: u32) -> bool {
         let (node, rate) = (&self.nodes[peer], crew.rate(&self.nodes[peer]));
-        let left = self.tiles - self.next;
+        let left = self.left();
         let mine = (node.in_hand() + atomic.min(left)) as f32 / rate;
         let others = (left + crew.in_hand - node.in_hand()) as f32;
         let others_rates = crew.rates - if node.runs.is_empty() { 0.0 } else { rate };
@@ -302,12 +317,12 @@ impl<'m> Dispatcher<'m> {
         if let Some(run) = self.second_hand(crew, atomic) {
             return Some(run);
         }
-        if self.next == self.tiles || self.ends_too_late(peer, crew, atomic) {
+        let left = self.left();
+        if left == 0 || self.ends_too_late(peer, crew, atomic) {
             return None;
         }
         let node = &self.nodes[peer];
-        let left = self.tiles - self.next;
-        let mut count = if node.runs.front().is_some_and(|run| run.count > atomic) {
+        let count = if node.runs.front().is_some_and(|run| run.count > atomic) {
             // It has enough to do. What comes behind need only last until the message after it is there: whatever it
             // has in hand, nobody else can take.
             atomic.min(left)
@@ -324,14 +339,52 @@ impl<'m> Dispatcher<'m> {
             let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
             if shares.nodes == 1 { left } else { chunk(&shares).min(proven) }
         };
-        // What is left after this run begins at a square, unless it would be nothing.
-        let end = (self.next + count).next_multiple_of(4).min(self.tiles);
-        if count >= 4 {
-            count = end - self.next;
+        Some(self.cut(peer, count))
+    }
+
+    /// Tiles that were never given out.
+    fn left(&self) -> u32 {
+        self.nodes.iter().map(|node| node.end - node.next).sum()
+    }
+
+    /// Parts of the picture that tiles are given out from: one for all, which the host's entry holds, or one for each
+    /// node, so that it draws on the same pages for long (biased scheduling, the 1995 report's chapter 8).
+    fn divide(&mut self) {
+        let parts = (self.nodes.len() as u32).saturating_sub(1).max(1);
+        let tiles = self.tiles;
+        let bound = |part: u32| (u64::from(tiles) * u64::from(part) / u64::from(parts)) as u32 / 4 * 4;
+        for (peer, node) in (0..).zip(self.nodes.iter_mut()) {
+            (node.next, node.end) = match (self.biased, peer) {
+                (false, 0) => (0, tiles),
+                (true, 1..) => (bound(peer - 1), if peer == parts { tiles } else { bound(peer) }),
+                _ => (0, 0),
+            };
         }
-        let run = Run { first: self.next, count, epoch: 0 };
-        self.next += count;
-        Some(run)
+    }
+
+    /// A run of `count` tiles, or of what its part has left: from the node's own part or, where that is empty, the end of
+    /// the one that has most left.
+    fn cut(&mut self, peer: usize, count: u32) -> Run {
+        let has = |node: &NodeState| node.end - node.next;
+        let own = if self.biased { peer } else { 0 };
+        let others = has(&self.nodes[own]) == 0;
+        let part =
+            if others { (0..self.nodes.len()).rev().max_by_key(|&p| has(&self.nodes[p])).unwrap_or(own) } else { own };
+        let part = &mut self.nodes[part];
+        let mut count = count.min(part.end - part.next);
+        // What is left begins at a square, unless it would be nothing.
+        if others {
+            if count >= 4 {
+                count = part.end - ((part.end - count) / 4 * 4).max(part.next);
+            }
+            part.end -= count;
+            return Run { first: part.end, count, epoch: 0 };
+        }
+        if count >= 4 {
+            count = (part.next + count).next_multiple_of(4).min(part.end) - part.next;
+        }
+        part.next += count;
+        Run { first: part.next - count, count, epoch: 0 }
     }
 
     /// A part of what the film asks for again, or of what a lost node left: all of it could be too much for one at the
@@ -365,14 +418,24 @@ impl<'m> Dispatcher<'m> {
         let count = self.nodes.len();
         for idle in 1..count {
             let node = &self.nodes[idle];
-            if !node.here || node.helping || !node.runs.is_empty() {
+            if !node.here || node.helping.is_some() || !node.runs.is_empty() {
                 continue;
             }
-            let busy = |peer: &usize| self.nodes[*peer].here && !self.nodes[*peer].runs.is_empty();
-            let Some(peer) = (self.shared + 1..count).chain(1..(self.shared + 1).min(count)).find(busy) else { return };
+            // Whoever has been at a run for longest; each in turn if several ask. Who has no run any more may still have
+            // rays that wait.
+            let key = |peer: &usize| {
+                let node = &self.nodes[*peer];
+                (node.runs.is_empty(), node.asked, node.since)
+            };
+            let may_be = |peer: &usize| {
+                let node = &self.nodes[*peer];
+                *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS
+            };
+            let Some(peer) = (1..count).filter(may_be).min_by_key(key) else { return };
             if send(link, peer as Peer, &Message::Share { with: idle as Peer }) {
-                self.nodes[idle].helping = true;
-                self.shared = peer;
+                self.nodes[idle].helping = Some(peer as Peer);
+                let helped = &mut self.nodes[peer];
+                (helped.asked, helped.helpers) = (helped.asked + 1, helped.helpers + 1);
             }
         }
     }
@@ -380,8 +443,13 @@ impl<'m> Dispatcher<'m> {
     /// Puts a run back where it came from: there is room for it there, or the rest of it.
     fn give_back(&mut self, run: Run) {
         let end = run.first + run.count;
-        if run.epoch == 0 && end == self.next {
-            self.next = run.first;
+        let was_cut = |node: &&mut NodeState| run.epoch == 0 && (node.next == end || node.end == run.first);
+        if let Some(part) = self.nodes.iter_mut().find(was_cut) {
+            if part.next == end {
+                part.next = run.first;
+            } else {
+                part.end = end;
+            }
             return;
         }
         let lost = self.nodes.iter_mut().filter(|n| n.lost).map(|n| &mut n.runs);
@@ -421,7 +489,7 @@ impl<'m> Dispatcher<'m> {
                 }
             }
         }
-        if self.next == self.tiles && self.again.is_empty() && !self.gathering {
+        if self.left() == 0 && self.again.is_empty() && !self.gathering {
             self.share(link);
         }
         if self.is_idle() && self.asked {

@@ -23,8 +23,8 @@ pub use film::{Film, FilmError, Fixed, Step, TileState};
 pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
 pub use node::{
-    All, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own, REQUESTS_MAX,
-    Settings, Store, Traffic, can_draw,
+    All, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own,
+    REQUESTS_MAX, Settings, Store, Traffic, can_draw,
 };
 
 pub use plan::{Plan, PlanError, Sizes};

@@ -49,9 +49,7 @@ impl Sizes {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// What every node must have does not fit.
-    #[error(
-        "{memory} bytes are too few for a node of this scene on {nodes} nodes: give each {needed} bytes or more"
-    )]
+    #[error("{memory} bytes are too few for a node of this scene on {nodes} nodes: give each {needed} bytes or more")]
     Memory {
         /// The budget.
         memory: u64,
@@ -265,7 +263,7 @@ impl Plan {
         let at = arena.take("where pages are", entries.len(), 0u32)?;
         let materials = &*arena.take_with("materials", shading.materials.len(), |i| shading.materials[i])?;
         let lights = &*arena.take_with("lights", shading.lights.len(), |i| shading.lights[i])?;
-        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::FREE)?;
+        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::free())?;
         let lines = arena.take("pages", self.lines, Line([0; 64]))?;
         let own = Own { lines, tables: Tables { materials: materials.len() } };
         let cache = Cache::new(own, entries, up, at, places, self.sizes.page_bytes_max);
@@ -302,7 +300,7 @@ impl Plan {
     ) -> Result<(NodeMemory<'m>, Cache<'m, Charged<'m>>), Short> {
         let memory = NodeMemory::carve(arena, &self.limits)?;
         let at = arena.take("where pages are", self.sizes.pages, 0u32)?;
-        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::FREE)?;
+        let places = arena.take_with("places of the cache", self.places, |_| CachePlace::free())?;
         let pages: &'m [PageView<'m>] = scene.resident.pages;
         let entries = scene.resident.directory.entries;
         Ok((memory, Cache::new(Charged(pages, bytes), entries, up, at, places, self.sizes.page_bytes_max)))

@@ -52,6 +52,7 @@ impl Walker<'_> {
             (ray.t_max, ray.primitive) = (best.candidate.t, best.candidate.id);
             (ray.hit_page, ray.slot) = (best.page, best.slot.0);
             if let Some(page) = walked.needs {
+                ray.moved &= u8::from(ray.page == page);
                 ray.page = page;
                 return None;
             }
@@ -72,7 +73,9 @@ impl Walker<'_> {
     pub fn arriving<P: Pages + ?Sized>(&mut self, scene: &Scene<'_, P>, ray: &mut RayRecord) -> Option<[f32; 3]> {
         if !scene.transmits {
             let walked = self.walk::<true, P>(scene, &ray.ray(), Hit::none(ray.t_max), ray.page);
-            ray.page = walked.needs.unwrap_or(ray.page);
+            let page = walked.needs.unwrap_or(ray.page);
+            ray.moved &= u8::from(ray.page == page);
+            ray.page = page;
             let blocked = walked.best.candidate.is_hit();
             return walked.needs.is_none().then_some(if blocked { [0.0; 3] } else { ray.weight });
         }
@@ -84,8 +87,8 @@ impl Walker<'_> {
             let Some(place) = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, &hit)) else {
                 return Some([0.0; 3]);
             };
-            let Some((origin, rest)) =
-                spawn::pass_through(&scene.shading, &place, ray.weight).filter(|_| u32::from(ray.passed) < SHADOW_CHAIN_MAX)
+            let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, ray.weight)
+                .filter(|_| u32::from(ray.passed) < SHADOW_CHAIN_MAX)
             else {
                 return Some([0.0; 3]);
             };

@@ -64,8 +64,10 @@ pub struct RayRecord {
     pub depth: u8,
     /// 1: the best hit is the nearest, and `page` is where it is to be shaded. Else 0.
     pub settled: u8,
+    /// 1: it was given to a node that had nothing to do, and goes on there. Else 0.
+    pub moved: u8,
     /// Zero.
-    pub reserved: u16,
+    pub reserved: u8,
 }
 
 /// A shadow ray that anything ends: 64 bytes. It starts outside all error bounds, so its interval starts at 0.
@@ -94,8 +96,10 @@ pub struct ShadowRecord {
     pub page: u32,
     /// The tile's epoch.
     pub epoch: u16,
+    /// 1: it was given to a node that had nothing to do, and goes on there. Else 0.
+    pub moved: u8,
     /// Zero.
-    pub reserved: u16,
+    pub reserved: u8,
 }
 
 /// What rays added to one pixel of a tile whose sums are at another node: 40 bytes.
@@ -167,6 +171,7 @@ impl From<&RayRecord> for ShadowRecord {
             tile: ray.tile,
             page: ray.page,
             epoch: ray.epoch,
+            moved: ray.moved,
             reserved: 0,
         }
     }
@@ -186,6 +191,7 @@ impl From<&ShadowRecord> for RayRecord {
             tile: shadow.tile,
             page: shadow.page,
             epoch: shadow.epoch,
+            moved: shadow.moved,
             primitive: Candidate::NOTHING,
             kind: RayKind::Shadow as u8,
             ..Self::zeroed()
@@ -208,9 +214,9 @@ mod tests {
         }
         at!(RayRecord: origin 0, direction 12, t_min 24, t_max 28, id 32, primitive 40, hit_page 44, weight 48, t_end 60,
             tile 64, page 68, epoch 72, home 74, slot 76, medium 78, passed 80, pixel 82, kind 83, depth 84, settled 85,
-            reserved 86);
+            moved 86, reserved 87);
         at!(ShadowRecord: origin 0, direction 12, t_max 24, home 28, pixel 30, depth 31, id 32, contribution 40, tile 52,
-            page 56, epoch 60, reserved 62);
+            page 56, epoch 60, moved 62, reserved 63);
         at!(Partial: sums 0, entry 24, tile 32, epoch 36, pixel 38, reserved 39);
     }
 
@@ -229,12 +235,13 @@ mod tests {
             tile: 14,
             page: 15,
             epoch: 16,
+            moved: 1,
             reserved: 0,
         };
         let ray = RayRecord::from(&short);
         assert_eq!(ShadowRecord::from(&ray), short);
         assert_eq!((ray.ray_kind(), ray.primitive, ray.t_min), (RayKind::Shadow, Candidate::NOTHING, 0.0));
-        assert_eq!((ray.settled, ray.passed, ray.medium, ray.reserved), (0, 0, 0, 0));
+        assert_eq!((ray.settled, ray.passed, ray.medium, ray.moved, ray.reserved), (0, 0, 0, 1, 0));
         assert_eq!((ray.weight, ray.t_max, ray.page), (short.contribution, 0.75, 15));
     }
 }

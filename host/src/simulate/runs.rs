@@ -92,7 +92,11 @@ impl<'a> Experiment<'a> {
         // The one-node run has unlimited memory (DESIGN section 12).
         let memory = self.memory.filter(|_| nodes > 1);
         let owners = memory.map(|memory| self.owners(nodes, memory)).transpose()?;
-        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget { memory, page_memory: self.page_memory, owners });
+        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget {
+            memory,
+            page_memory: self.page_memory,
+            owners,
+        });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
     }
@@ -166,7 +170,6 @@ impl<'a> Experiment<'a> {
             sent_messages: node.traffic.sent_frames,
             sent_bytes: node.traffic.sent_bytes,
             memory_high_water: memory(node),
-            ..NodeRun::default()
         });
         let forwarded = run.nodes.iter().map(|node| node.exchange.forwarded).sum();
         Run {

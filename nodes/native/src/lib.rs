@@ -9,8 +9,8 @@ use hybray_runner::{run_master, run_node};
 use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
-    All, Asked, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, PageServer, Plan,
-    PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw,
+    All, Asked, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome,
+    PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -168,6 +168,8 @@ fn dispatcher_at(farm: &Farm) -> Peer {
 }
 
 type Clock = dyn Fn() -> u64 + Sync;
+/// Makes and turns a node, on a thread of its own.
+type Turn<'a> = dyn Fn(Peer, &mut MemoryLink, Option<Dispatcher<'_>>, &Clock) -> Worked + Sync + 'a;
 
 fn turn<P: Store>(
     mut node: Node<'_, '_, P>,
@@ -197,11 +199,13 @@ fn run(
     farm: &Farm,
     pages: &[&[u8]],
     watch: &mut dyn FnMut(Progress) -> bool,
-    node: &(dyn Fn(Peer, &mut MemoryLink, Option<Dispatcher<'_>>, &Clock) -> Worked + Sync),
+    node: &Turn<'_>,
 ) -> Option<Traced> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
     let nodes = farm.nodes.clamp(1, NODES_MAX);
     let peers = usize::from(nodes) + 1;
+    // Where nodes must ask for pages, each does best to draw on the same ones for long.
+    let biased = !pages.is_empty();
     let dispatcher_at = dispatcher_at(farm);
     let worked = Mutex::new(vec![Worked::default(); usize::from(nodes)]);
 
@@ -221,13 +225,13 @@ fn run(
             threads.spawn(move || {
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
-                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options));
+                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options).biased(biased));
                 let did = node(peer, &mut link, dispatcher, clock);
                 worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });
         }
         let mut states = vec![NodeState::default(); peers];
-        let dispatcher = (dispatcher_at == HOST).then(|| Dispatcher::new(&mut states, farm.options));
+        let dispatcher = (dispatcher_at == HOST).then(|| Dispatcher::new(&mut states, farm.options).biased(biased));
         let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
         let server = PageServer::new(&mut asked, &mut turns);
         let outcome = run_master(&mut master, dispatcher, server, pages, &mut host_link, &mut { clock }, watch);

@@ -14,8 +14,8 @@ mod turn;
 mod worker;
 mod world;
 
-pub use hybray_sim::{LinkCounts, LinkModel, Network, NetworkModel, Topology, Traffic};
 pub use hybray_scheduler::Traffic as Exchange;
+pub use hybray_sim::{LinkCounts, LinkModel, Network, NetworkModel, Topology, Traffic};
 pub use machine::{Costs, MACHINES, Machine, MessageCosts, Operations};
 
 use hybray_link::Peer;
@@ -213,8 +213,7 @@ pub fn simulate_spoiled(
     let (settings, dispatcher) = (farm.settings, farm.dispatcher);
     let shared = worker::Shared { scene, scene_hash, up: &up, pages, plan, settings, dispatcher };
     let mut memories: Vec<worker::Memory> = (1..peers).map(|_| worker::memory(&plan)).collect();
-    let workers =
-        (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
+    let workers = (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
     let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
     let server = PageServer::new(&mut asked, &mut turns);
     let mut world = world::World::new(farm, plan, master, &mut states, server, pages, workers);

@@ -179,7 +179,8 @@ impl Machine {
             policy,
             link: LinkCost { message_ns: narrow(message_ns), byte_ps: narrow(2 * messages.byte + wire_ps) },
             ray_ns: narrow(ray_ns),
-            deadline_ns: 8 * message_ns,
+            // Long enough for company: a frame of rays costs as much as some dozens of them.
+            deadline_ns: 48 * message_ns,
             steps: 16,
             ..Settings::default()
         }

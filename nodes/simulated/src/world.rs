@@ -8,6 +8,7 @@ use crate::turn::{KINDS, Said, Turn};
 use crate::worker::Worker;
 use crate::{Farm, NodeRun, SimulateError, Simulated};
 use hybray_link::{HOST, Peer};
+use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
 use hybray_sim::Network;
 use hybray_wire::Message;
@@ -71,7 +72,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             farm,
             network: Network::new(&farm.machine.network(farm.nodes), peers),
             master,
-            dispatcher: Dispatcher::new(states, farm.options),
+            dispatcher: Dispatcher::new(states, farm.options).biased(farm.settings.policy != Policy::DemandDriven),
             server,
             pages,
             seats: workers

@@ -13,6 +13,9 @@ use hybray_simulated::{Machine, NodeRun, SimulateError, Simulated};
 use hybray_tests::scene;
 use rayon::prelude::*;
 
+/// A run that is watched so often for each tile and sample without coming to its end never comes to it: then it failed.
+const TURNS_MAX: u64 = 3000;
+
 /// One run: a scene, cut in some way, on a machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Job {
@@ -79,7 +82,7 @@ impl Job {
     }
 
     /// The same by a scheduler of the report, with its grid of voxels and the settings of its table 6.1.
-    pub fn as_published(self, policy: Policy, grid: &str) -> Self {
+    pub fn in_1995(self, policy: Policy, grid: &str) -> Self {
         let in_system = Some(9000 / u32::from(self.nodes));
         Self { policy, voxels: format!("{grid}x1"), granularity: Some(100), in_system, bundle_tiles: Some(4), ..self }
     }
@@ -111,25 +114,15 @@ pub struct Figures {
     pub ray_messages: u64,
     /// Pages that came to nodes.
     pub fetched: u64,
-    /// Rays started.
-    pub rays: u64,
-    /// Least and most rays started or taken over by a node, over their mean.
-    pub balance: [f64; 2],
-    /// What the scene's pages take.
-    pub scene_bytes: u64,
     /// The node that needed most, bytes.
     pub memory_high_water: u64,
     film: u64,
 }
 
 impl Figures {
-    fn of(run: &Simulated, scene_bytes: u64) -> Self {
+    fn of(run: &Simulated) -> Self {
         let sum = |of: &dyn Fn(&NodeRun) -> u64| run.nodes.iter().map(of).sum::<u64>();
         let ray_messages = run.kinds.iter().find(|(kind, _)| *kind == "rays").map_or(0, |(_, (frames, _))| *frames);
-        let computing = |node: &NodeRun| node.computing_ns as f64;
-        let mean = run.nodes.iter().map(computing).sum::<f64>() / run.nodes.len() as f64;
-        let least = run.nodes.iter().map(computing).fold(f64::INFINITY, f64::min);
-        let most = run.nodes.iter().map(computing).fold(0.0, f64::max);
         let fixed = run.plan.sum().total_bytes() - run.plan.lines as u64 * 64;
         Self {
             seconds: run.time_ns as f64 * 1e-9,
@@ -141,9 +134,6 @@ impl Figures {
             forwarded: sum(&|node| node.exchange.forwarded),
             ray_messages,
             fetched: sum(&|node| node.exchange.fetched),
-            rays: run.operations().rays,
-            balance: [least / mean, most / mean],
-            scene_bytes,
             memory_high_water: run.nodes.iter().map(|node| fixed + node.high_water.page_bytes).max().unwrap_or(0),
             film: run.film,
         }
@@ -294,8 +284,14 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     let scene_bytes = Sizes::of(&scene).pages_bytes;
     experiment.memory = job.memory_mib.map(|mib| mib << 20);
     experiment.page_memory = job.share.map(|share| scene_bytes / share);
-    match experiment.simulated(job.nodes, &mut |_| true) {
-        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run, scene_bytes)),
+    let tiles: u64 = job.size.iter().map(|&side| u64::from(side.div_ceil(8))).product();
+    let mut turns = TURNS_MAX * (tiles + u64::from(job.nodes)) * u64::from(job.samples);
+    let goes_on = &mut |_| {
+        turns -= 1;
+        turns > 0
+    };
+    match experiment.simulated(job.nodes, goes_on) {
+        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run)),
         Ok(run) => Err(failed(format!("{:?}", run.outcome))),
         Err(RunError::Misfit(_) | RunError::Simulate(SimulateError::Plan(_))) => Err(Without::Memory),
         Err(error) => Err(failed(error.to_string())),

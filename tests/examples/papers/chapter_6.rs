@@ -55,7 +55,7 @@ pub fn criteria(bench: &Bench, published: &Published) -> Result<String> {
         )?;
         if row.text("criterion")? == "all processes" {
             let job = Job::of_1995("paper:balls", 16);
-            cells_of_row.extend(run(bench, &job.clone().as_published(Policy::Hybrid1995, "4x4")));
+            cells_of_row.extend(run(bench, &job.clone().in_1995(Policy::Hybrid1995, "4x4")));
             cells_of_row.extend(run(bench, &job));
         } else {
             cells_of_row.extend(cells(NOT_SIMULATED));
@@ -78,7 +78,7 @@ pub fn subhosts(bench: &Bench, published: &Published) -> Result<String> {
             let job = Job::of_1995(&format!("paper:{}", row.text("model")?), 16);
             for policy in [Policy::Hybrid1995, Policy::Hybrid] {
                 for tiles in [1, 4] {
-                    let published = job.clone().as_published(policy, "4x4");
+                    let published = job.clone().in_1995(policy, "4x4");
                     let job = if policy == Policy::Hybrid { job.clone() } else { published };
                     line.extend(run(bench, &Job { bundle_tiles: Some(tiles), ..job }));
                 }
@@ -114,7 +114,7 @@ fn scaling(bench: &Bench, published: &Published, name: &str, scene: &str) -> Res
 
 /// `policy` as published, and `hybrid`.
 fn both(bench: &Bench, job: &Job, policy: Policy, row: &Row) -> Result<Vec<String>> {
-    let mut cells = run(bench, &job.clone().as_published(policy, row.text("grid")?));
+    let mut cells = run(bench, &job.clone().in_1995(policy, row.text("grid")?));
     cells.extend(run(bench, job));
     Ok(cells)
 }
@@ -137,11 +137,15 @@ pub fn light_cache(bench: &Bench, published: &Published) -> Result<String> {
 
 /// Table 6.7: data parallel alone.
 pub fn data_parallel(bench: &Bench, published: &Published) -> Result<String> {
-    let mut table = table(&["nodes", "paper: s", "busy %"], &["`data-parallel`", "`hybrid`"]);
+    let groups = ["`data-parallel`, 100 rays a message", "`data-parallel`, 1 ray a message", "`hybrid`"];
+    let mut table = table(&["nodes", "paper: s", "busy %"], &groups);
     for row in published.table("t6_7_data_parallel")? {
         let mut line = columns(row, &["processors", "s", "eff"])?;
         let job = Job::of_1995("paper:balls", row.number("processors")?);
-        line.extend(both(bench, &job, Policy::DataParallel, row)?);
+        let published = job.clone().in_1995(Policy::DataParallel, row.text("grid")?);
+        for job in [published.clone(), Job { granularity: Some(1), ..published }, job] {
+            line.extend(run(bench, &job));
+        }
         table.row(line);
     }
     Ok(table.finish())
@@ -155,7 +159,7 @@ pub fn reflectivity(bench: &Bench, published: &Published) -> Result<String> {
         let mut line = columns(row, &["level", "hybrid_s", "hybrid_eff", "data_parallel_s", "data_parallel_eff"])?;
         let job = Job::of_1995(&format!("paper:balls:{}", row.text("level")?), 16);
         for policy in [Policy::Hybrid1995, Policy::DataParallel] {
-            line.extend(run(bench, &job.clone().as_published(policy, "4x4")));
+            line.extend(run(bench, &job.clone().in_1995(policy, "4x4")));
         }
         line.extend(run(bench, &job));
         table.row(line);
@@ -187,7 +191,7 @@ fn large(bench: &Bench, published: &Published, name: &str, scene: &str, share: u
         let mut line = columns(row, &["processors", &columns_of[0], &columns_of[1]])?;
         let job = Job::of_1995(scene, nodes).with_share(share);
         for policy in [Policy::DataParallel, Policy::Hybrid1995] {
-            line.extend(run(bench, &job.clone().as_published(policy, grid(nodes))));
+            line.extend(run(bench, &job.clone().in_1995(policy, grid(nodes))));
         }
         line.extend(run(bench, &job));
         table.row(line);

@@ -74,7 +74,7 @@ fn main() -> Result<ExitCode> {
         if args.only.is_empty() { args.full || !e.is_long } else { args.only.iter().any(|name| name == e.name) }
     };
     let wanted: Vec<_> = EXPERIMENTS.iter().filter(is_wanted).collect();
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let docs = docs();
     let mut bench = Bench::default();
     let blocks = blocks(&mut bench, &Published::read(&docs.join("paper-tables"))?, &wanted)?;
     if args.only.is_empty() {
@@ -88,6 +88,10 @@ fn main() -> Result<ExitCode> {
     Ok(if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
+fn docs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
+}
+
 /// Each table is made twice: the first time to learn which runs it wants.
 fn blocks(bench: &mut Bench, published: &Published, wanted: &[&Experiment]) -> Result<Vec<(&'static str, String)>> {
     for experiment in wanted {
@@ -97,7 +101,7 @@ fn blocks(bench: &mut Bench, published: &Published, wanted: &[&Experiment]) -> R
     wanted.iter().map(|e| Ok((e.name, (e.block)(bench, published)?))).collect()
 }
 
-fn write(path: &PathBuf, blocks: &[(&'static str, String)]) -> Result<()> {
+fn write(path: &Path, blocks: &[(&'static str, String)]) -> Result<()> {
     let mut text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     for (name, block) in blocks {
         text = page::replaced(&text, name, block).with_context(|| path.display().to_string())?;
@@ -108,10 +112,6 @@ fn write(path: &PathBuf, blocks: &[(&'static str, String)]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn docs() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
-    }
 
     /// Every table, with pictures of a few pixels: each run ends, and all runs of a scene draw the same picture.
     #[test]

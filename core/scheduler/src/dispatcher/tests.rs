@@ -280,7 +280,7 @@ fn the_last_tiles_are_not_for_a_slow_node() {
     let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4) });
     d.poll(&mut wire, 0);
     [(1, 100), (2, 100), (3, 1_000)].iter().for_each(|&(node, cost)| done(&mut d, node, 4 * cost, 4_000));
-    d.next = 56;
+    d.nodes[0].next = 56;
     d.nodes.iter_mut().for_each(|node| node.runs.clear());
     let crew = d.crew();
     assert!((crew.rate(&d.nodes[3]) / crew.rate(&d.nodes[1]) - 0.1).abs() < 1e-6);
@@ -289,7 +289,7 @@ fn the_last_tiles_are_not_for_a_slow_node() {
     d.poll(&mut wire, 4_000);
     assert_eq!(wire.take(), [(1, 56, 4, 0), (2, 60, 4, 0)]);
 
-    d.next = 60;
+    d.nodes[0].next = 60;
     d.nodes[1].runs.clear();
     let crew = d.crew();
     assert!(d.ends_too_late(3, &crew, 1), "one tile takes it as long as ten take another");
@@ -349,12 +349,14 @@ fn who_has_nothing_is_shared_with_once_at_a_time() {
     dispatcher.handle(3, &Message::Idle, 2);
     dispatcher.poll(&mut wire, 2);
     assert_eq!(wire.shared[1..], [(2, 3)]);
-    // When nobody has a run there is nothing to share.
+    // Who has no run any more may still have rays; but not who is being helped.
     dispatcher.handle(3, &Message::Idle, 3);
     for (peer, first, count, _) in wire.sent.clone() {
         dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
     }
     dispatcher.poll(&mut wire, 4);
-    assert_eq!(wire.shared.len(), 2);
+    assert_eq!(wire.shared[2..], [(3, 1), (3, 2)]);
+    dispatcher.poll(&mut wire, 5);
+    assert_eq!(wire.shared.len(), 4);
     assert_eq!(wire.told, [1, 2, 3]);
 }

@@ -1,9 +1,9 @@
 //! What travels between nodes: rays, pages, partial sums, and the sums of finished tiles.
 
 use super::tiles::{OpenTile, Stage as TileStage, TILE_PIXELS, place_of};
-use super::{Node, Store};
-use crate::{rules, send};
+use super::{Node, Stage, Store};
 use crate::node::store::Landed;
+use crate::{rules, send};
 use bytemuck::{bytes_of, pod_read_unaligned};
 use hybray_arena::List;
 use hybray_geometry::Candidate;
@@ -77,7 +77,8 @@ impl<P: Store> Node<'_, '_, P> {
                 continue;
             }
             self.traffic.arrived += 1;
-            self.helped |= rules::was_helped(true, ray.settled == 1 && ray.kind == RayKind::Primary as u8);
+            let shared = ray.moved == 1 || (ray.settled == 1 && ray.kind == RayKind::Primary as u8);
+            self.helped |= rules::was_helped(true, shared);
             let here = self.store.page(ray.page).is_some();
             // There is room for all of them.
             let _ = self.memory.pool.push(ray, here);
@@ -91,6 +92,7 @@ impl<P: Store> Node<'_, '_, P> {
         (ray.page as usize) < pages
             && (ray.primitive == Candidate::NOTHING || (ray.hit_page as usize) < pages)
             && ray.settled <= 1
+            && ray.moved <= 1
             && ray.kind <= RayKind::Shadow as u8
             && (1..=super::DEPTH_MAX as u8).contains(&ray.depth)
             && map.is_some_and(|map| ray.tile < map.len() && usize::from(ray.pixel) < map.tile(ray.tile).pixels())
@@ -116,8 +118,15 @@ impl<P: Store> Node<'_, '_, P> {
         }
     }
 
-    fn load(&self) -> u16 {
-        self.memory.pool.ready_rays().min(usize::from(u16::MAX)) as u16
+    /// Rays that wait here to be traced, those of tiles that are not begun included.
+    pub(super) fn load(&self) -> u16 {
+        let bundle = match self.stage {
+            Stage::Shading { next, end, .. } => end - next,
+            Stage::Idle => 0,
+        };
+        let tiles: u32 = self.runs.iter().map(|run| run.count - run.done).sum();
+        let all = self.memory.pool.ready_rays() + bundle + tiles as usize * TILE_PIXELS;
+        all.min(usize::from(u16::MAX)) as u16
     }
 
     /// Tells those who sent rays whether they were taken.
@@ -216,7 +225,8 @@ impl<P: Store> Node<'_, '_, P> {
             if state.outbox.is_empty() {
                 continue;
             }
-            let due = idle || state.outbox.len() >= granularity || now.saturating_sub(since) >= self.settings.deadline_ns;
+            let due =
+                idle || state.outbox.len() >= granularity || now.saturating_sub(since) >= self.settings.deadline_ns;
             if !due || !rules::may_send(state.flight.len()) {
                 m.peers.send_on(peer, since);
                 continue;
@@ -228,8 +238,7 @@ impl<P: Store> Node<'_, '_, P> {
             let message = Message::Rays { rays: (front.len() - shadows) as u16, shadows: shadows as u16, load };
             let went = link.send(peer, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
                 encode(&message, room, |body| {
-                    let (mut nearest, mut any) =
-                        body.split_at_mut((front.len() - shadows) * size_of::<RayRecord>());
+                    let (mut nearest, mut any) = body.split_at_mut((front.len() - shadows) * size_of::<RayRecord>());
                     for ray in m.pool.iter(&front) {
                         if is_compact(&ray) {
                             let (bytes, rest) = any.split_at_mut(size_of::<ShadowRecord>());

@@ -8,6 +8,8 @@
 //! Nothing waits for room that may never come (DESIGN section 2, law 3): where the pool is full, the ray that the lane has
 //! in hand stays there, and its page is fetched into a place that is kept for it.
 
+mod ahead;
+mod choose;
 mod frames;
 mod memory;
 mod peers;
@@ -22,11 +24,12 @@ pub use store::{All, Backing, Cache, Charged, Landed, Own, Place as CachePlace, 
 
 pub(crate) use peers::{PeerState, Peers};
 
-use crate::policy::{Choice, LinkCost, Policy, Situation, decide};
+use crate::policy::{LinkCost, Policy};
 use crate::{rules, send};
+use ahead::Ahead;
 use hybray_bintree::walk::{FROM_ROOT, Hit};
-use hybray_geometry::simd::Kernels;
 use hybray_geometry::Ray;
+use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Link, Peer};
 use hybray_pyraclip::wide;
 use hybray_scene::Pages;
@@ -188,6 +191,7 @@ pub struct Node<'m, 's, P: Store> {
     depth: usize,
     /// The ray that the lane has in hand and the pool has no room for.
     aside: Option<RayRecord>,
+    ahead: Ahead,
     requests: heapless::Vec<Request, { REQUESTS_MAX + 1 }>,
     /// The wanted page that is looked at next.
     looked_at: usize,
@@ -239,6 +243,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             stage: Stage::Idle,
             depth: 0,
             aside: None,
+            ahead: Ahead::default(),
             requests: heapless::Vec::new(),
             looked_at: 0,
             done: heapless::Deque::new(),
@@ -329,44 +334,6 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             Message::Fetch { page } => self.memory.server.fetch(from, page),
             Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
             _ => {}
-        }
-    }
-
-    /// Gives half of the bundle's rays that are still to be shaded, and that hit something, to a node that has nothing
-    /// to do; or lets it know that there are none.
-    fn share(&mut self, with: Peer) {
-        let Some(picture) = &self.picture else { return };
-        let Bundle { rays, walked, places, .. } = &mut *self.memory.bundle;
-        if with == self.me || with == HOST || self.memory.peers.get(with).is_none_or(|p| p.lost) {
-            return;
-        }
-        let outbox = self.memory.peers.send(with, 0);
-        let mut given = 0;
-        if let Stage::Shading { sample, next, mut end } = self.stage {
-            let most = (end - next).div_ceil(2).min(usize::from(self.settings.granularity));
-            for at in (next..end).rev() {
-                if given == most {
-                    break;
-                }
-                let best = walked[at].best;
-                if walked[at].needs.is_some() || !best.candidate.is_hit() {
-                    continue;
-                }
-                let tile = self.in_work.tiles[usize::from(places[at].tile)];
-                let ray = primary(&picture.frame, &rays[at], &places[at], &best, sample, tile, self.me);
-                if self.memory.pool.push_to(outbox, RayRecord { settled: 1, page: best.page, ..ray }).is_err() {
-                    break;
-                }
-                given += 1;
-                end -= 1;
-                rays.swap(at, end);
-                walked.swap(at, end);
-                places.swap(at, end);
-            }
-            self.stage = Stage::Shading { sample, next, end };
-        }
-        if let Some(peer) = self.memory.peers.get(with) {
-            peer.none_to_share = given == 0;
         }
     }
 
@@ -478,11 +445,11 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             if let Some(page) = pool.ready_page() {
                 if !at_hand(&scene, page) {
                     pool.not_ready();
-                } else if let Some(ray) = pool.pop_ready() {
-                    if let Some(ray) = lane.take(&scene, &mut walker, ray, &mut sums, &mut counts) {
-                        let here = at_hand(&scene, ray.page);
-                        self.aside = pool.push(ray, here).err();
-                    }
+                } else if let Some(ray) = pool.pop_ready()
+                    && let Some(ray) = lane.take(&scene, &mut walker, ray, &mut sums, &mut counts)
+                {
+                    let here = at_hand(&scene, ray.page);
+                    self.aside = pool.push(ray, here).err();
                 }
                 continue;
             }
@@ -517,10 +484,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 }
                 Stage::Shading { .. } => {
                     self.stage = Stage::Idle;
-                    if self.in_work.of_run && let Some(run) = self.runs.front_mut() {
+                    if self.in_work.of_run
+                        && let Some(run) = self.runs.front_mut()
+                    {
                         run.done += self.in_work.count as u32;
                         self.tiles += self.in_work.count as u32;
-                        if run.done == run.count && let Some(run) = self.runs.pop_front() {
+                        if run.done == run.count
+                            && let Some(run) = self.runs.pop_front()
+                        {
                             // There is room: no more runs are taken in than this queue holds, and each is told before
                             // the next ends.
                             let _ = self.done.push_back(run);
@@ -533,7 +504,16 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 Stage::Idle => {
                     let room = pool.capacity() == 0
                         || rules::may_begin(pool.len(), pool.capacity(), self.settings.in_system as usize);
-                    let begun = if room { begin(picture, &self.runs, sums.tiles, self.settings.bundle_tiles) } else { None };
+                    // The next bundle's pages come first, if they can be had.
+                    let next = next_bundle(picture, &self.runs, None, self.settings.bundle_tiles).filter(|_| room);
+                    if pool.capacity() > 0
+                        && let Some(next) = next
+                    {
+                        let kernels = self.kernels;
+                        self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
+                    }
+                    let begun =
+                        if room { begin(picture, &self.runs, sums.tiles, self.settings.bundle_tiles) } else { None };
                     let Some(begun) = begun else {
                         units -= 1;
                         break;
@@ -541,6 +521,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     bundles += 1;
                     let count = begun.place(picture, places);
                     self.in_work = InWork { rays: count, ..begun };
+                    self.ahead.begin();
+                    let next = next_bundle(picture, &self.runs, Some(&begun), self.settings.bundle_tiles);
+                    if pool.capacity() > 0
+                        && let Some(next) = next
+                    {
+                        let kernels = self.kernels;
+                        self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
+                    }
                     start_sample(picture, 0, &places[..count], &mut rays[..count]);
                     trace_bundle(&scene, &rays[..count], walked, scratch, &mut walker);
                     counts.primary += count as u64;
@@ -616,85 +604,6 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
         }
         sent
-    }
-
-    /// Looks at wanted pages, and has their rays go there or the pages come here.
-    fn decide(&mut self, now: u64) {
-        let (load, idle) = (self.memory.pool.ready_rays() as u32, self.idle);
-        // The lane first: nothing else must take its turn.
-        if let Some(ray) = self.aside.filter(|ray| !at_hand(&self.scene.at_hand(&self.store), ray.page)) {
-            self.request(ray.page, true);
-        }
-        let count = self.memory.pool.wanted().len();
-        for _ in 0..count.min(DECISIONS) {
-            let wanted = self.memory.pool.wanted();
-            if wanted.is_empty() {
-                break;
-            }
-            self.looked_at = if self.looked_at < wanted.len() { self.looked_at } else { 0 };
-            let page = wanted[self.looked_at];
-            self.looked_at += 1;
-            let state = *self.memory.pool.page(page);
-            if state.asked {
-                continue;
-            }
-            let entry = self.scene.resident.directory.entries[page as usize];
-            let Some(oldest) = self.memory.pool.oldest(page) else { continue };
-            let kind = oldest.ray_kind();
-            let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
-            let situation = Situation {
-                rays: self.memory.pool.waiting(page) as u32,
-                kind,
-                page_bytes: entry.bytes,
-                uses: u32::from(state.uses),
-                owner_is_full: owner.full,
-                owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
-                owner_load: u32::from(owner.load),
-                load,
-                idle,
-                granularity: u32::from(self.settings.granularity),
-                ray_ns: self.settings.ray_ns,
-                link: self.settings.link,
-            };
-            match decide(self.settings.policy, &situation) {
-                Choice::Forward => {
-                    let outbox = self.memory.peers.send(entry.owner, now);
-                    self.memory.pool.move_to(page, outbox);
-                }
-                Choice::Fetch => {
-                    let has_place = self.request(page, false);
-                    if rules::goes_again(has_place, owner.full, situation.owner_traces) {
-                        // No place for the page either: the owner is asked once more.
-                        let outbox = self.memory.peers.send(entry.owner, now);
-                        self.memory.pool.move_to(page, outbox);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Reserves a place for `page`, and has it asked for.
-    fn request(&mut self, page: u32, for_lane: bool) -> bool {
-        if self.requests.iter().any(|r| r.page == page) {
-            return true;
-        }
-        let requests = usize::from(self.settings.requests).clamp(1, REQUESTS_MAX);
-        if !rules::may_request(self.requests.len(), requests, REQUESTS_MAX, for_lane) {
-            return false;
-        }
-        let owner = self.scene.resident.directory.entries[page as usize].owner;
-        let lost = owner == self.me || self.memory.peers.get(owner).is_none_or(|p| p.lost);
-        let from = if lost { HOST } else { owner };
-        let pool = &self.memory.pool;
-        if !self.store.reserve(page, for_lane, &|p| pool.waiting(p) > 0) {
-            return false;
-        }
-        self.memory.pool.page(page).asked = true;
-        // There is room: the limit was looked at.
-        let _ = self.requests.push(Request { page, from, sent: false });
-        self.high_water.requests = (self.high_water.requests.0.max(self.requests.len()), REQUESTS_MAX + 1);
-        self.high_water.page_bytes = self.high_water.page_bytes.max(self.store.bytes_held());
-        true
     }
 }
 
@@ -786,6 +695,23 @@ fn begin(
         }
     }
     Some(work)
+}
+
+/// First tile and number of tiles of the bundle that comes next, after one that is begun if there is one.
+fn next_bundle(
+    picture: &Picture,
+    runs: &heapless::Deque<Run, RUNS>,
+    begun: Option<&InWork>,
+    bundle_tiles: u8,
+) -> Option<(u32, u32)> {
+    let after = begun.filter(|work| work.of_run).map_or(0, |work| work.count as u32);
+    let mut runs = runs.iter();
+    let run = runs.next()?;
+    let (first, left) = match run.count - run.done - after {
+        0 => runs.next().map(|run| (run.first, run.count))?,
+        left => (run.first + run.done + after, left),
+    };
+    Some((first, if bundle_tiles >= 4 { picture.map.square(first, left) } else { 1 }))
 }
 
 impl InWork {

@@ -51,11 +51,7 @@ pub struct Peers<'m> {
 
 impl<'m> Peers<'m> {
     /// Peers of whom nothing is known. The rings have room for one entry each.
-    pub fn new(
-        all: &'m mut [PeerState],
-        answers: Ring<'m, Peer>,
-        sends: Ring<'m, Peer>,
-    ) -> Self {
+    pub fn new(all: &'m mut [PeerState], answers: Ring<'m, Peer>, sends: Ring<'m, Peer>) -> Self {
         Self { all, answers, sends }
     }
 

@@ -27,8 +27,10 @@ impl PageState {
 }
 
 const NOWHERE: u32 = u32::MAX;
-/// Uses are halved when so many times the pool's size of rays have come in.
-const AGE_FACTOR: usize = 4;
+/// Fewer rays than this are not given away.
+const GIVEN_MIN: usize = 8;
+/// Uses are halved when so many rays have come in: about as many as a page stays in a small cache for.
+const AGE_RAYS: usize = 256;
 
 /// The pool.
 pub struct Pool<'m> {
@@ -177,6 +179,25 @@ impl<'m> Pool<'m> {
         ray
     }
 
+    /// Moves half of the rays of the page at hand that most of them wait for, and at most `most`, to the end of `list`:
+    /// for a node that has nothing to do. Few are not worth a page. Returns how many. Bounded: the ready pages, and the
+    /// rays of one.
+    pub fn give(&mut self, list: &mut List, most: usize) -> usize {
+        let Some(&page) = self.ready.iter().max_by_key(|&&page| self.waiting(page)) else { return 0 };
+        let count = (self.waiting(page) / 2).min(most);
+        if count < GIVEN_MIN {
+            return 0;
+        }
+        let mut given = self.slab.split_front(&mut self.pages[page as usize].rays, count);
+        self.ready_rays -= count;
+        for _ in 0..count {
+            let Some(ray) = self.slab.pop_front(&mut given) else { break };
+            // Its place was free this moment.
+            let _ = self.slab.push_back(list, RayRecord { moved: 1, ..ray });
+        }
+        count
+    }
+
     /// The page that was ready for longest is no longer at hand: its rays wait for it again.
     pub fn not_ready(&mut self) {
         let Some(page) = self.ready.pop_front() else { return };
@@ -226,7 +247,7 @@ impl<'m> Pool<'m> {
     /// Halves how often pages were used, every so many rays: what was wanted long ago says little.
     fn age(&mut self) {
         self.pushed += 1;
-        if self.pushed >= AGE_FACTOR * self.capacity() {
+        if self.pushed >= AGE_RAYS {
             self.pushed = 0;
             self.pages.iter_mut().for_each(|page| page.uses /= 2);
         }

@@ -135,7 +135,10 @@ pub struct Place {
 
 impl Place {
     /// A place without a page.
-    pub const FREE: Self = Self { page: NOWHERE, landed: 0, used: Cell::new(false) };
+    #[must_use]
+    pub const fn free() -> Self {
+        Self { page: NOWHERE, landed: 0, used: Cell::new(false) }
+    }
 
     fn state(&self) -> PlaceState {
         match (self.page, self.landed) {
@@ -181,7 +184,7 @@ impl<'m, B: Backing> Cache<'m, B> {
         place_bytes: usize,
     ) -> Self {
         at.fill(NOWHERE);
-        places.fill_with(|| Place::FREE);
+        places.fill_with(Place::free);
         Self { backing, sizes, parents, at, places, place_lines: lines_for(place_bytes), fixed: 0, hand: 0, held: 0 }
     }
 
@@ -212,7 +215,7 @@ impl<'m, B: Backing> Cache<'m, B> {
     }
 
     fn free(&mut self, place: usize) {
-        let page = core::mem::replace(&mut self.places[place], Place::FREE).page;
+        let page = core::mem::replace(&mut self.places[place], Place::free()).page;
         if page != NOWHERE {
             self.at[page as usize] = NOWHERE;
             self.held -= u64::from(self.sizes[page as usize].bytes);

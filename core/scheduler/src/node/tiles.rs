@@ -135,14 +135,7 @@ impl Sums<'_, '_> {
             return;
         }
         let Some(list) = self.lists.get_mut(usize::from(origin.home)) else { return };
-        let new = Partial {
-            sums,
-            entry,
-            tile: origin.tile,
-            epoch: origin.epoch,
-            pixel: origin.pixel,
-            reserved: 0,
-        };
+        let new = Partial { sums, entry, tile: origin.tile, epoch: origin.epoch, pixel: origin.pixel, reserved: 0 };
         let same = |p: &&mut Partial| (p.tile, p.epoch, p.pixel) == (new.tile, new.epoch, new.pixel);
         if let Some(last) = self.partials.back_mut(list).filter(same) {
             for (sum, steps) in last.sums.iter_mut().zip(sums) {

@@ -55,12 +55,12 @@ pub struct Situation {
     pub owner_is_full: bool,
     /// Whether the page's owner is this node's peer at all: if not, its home has the page, and nobody takes the rays.
     pub owner_traces: bool,
+    /// Rays that are to go to the owner already.
+    pub outbox: u32,
     /// Rays that wait at the owner, as it said last.
     pub owner_load: u32,
     /// Rays that wait here for pages at hand.
     pub load: u32,
-    /// Whether this node has nothing else to do.
-    pub idle: bool,
     /// Rays that may go into one message.
     pub granularity: u32,
     /// What a ray takes to trace, nanoseconds.

@@ -1,0 +1,147 @@
+//! What goes where: rays to the nodes that have their pages, pages to the nodes that have the rays, and some of the work to
+//! a node that has none.
+
+use super::memory::Bundle;
+use super::{DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Store, at_hand, primary};
+use crate::policy::{Choice, Situation, decide};
+use crate::rules;
+use hybray_link::{HOST, Peer};
+use hybray_wire::RayRecord;
+
+impl<P: Store> Node<'_, '_, P> {
+    /// Gives half of the bundle's rays that are still to be shaded, and that hit something, to a node that has nothing
+    /// to do; or lets it know that there are none.
+    pub(super) fn share(&mut self, with: Peer) {
+        let Some(picture) = &self.picture else { return };
+        let Bundle { rays, walked, places, .. } = &mut *self.memory.bundle;
+        if with == self.me || with == HOST || self.memory.peers.get(with).is_none_or(|p| p.lost) {
+            return;
+        }
+        let outbox = self.memory.peers.send(with, 0);
+        let mut given = 0;
+        if let Stage::Shading { sample, next, mut end } = self.stage {
+            let most = (end - next).div_ceil(2).min(usize::from(self.settings.granularity));
+            for at in (next..end).rev() {
+                if given == most {
+                    break;
+                }
+                let best = walked[at].best;
+                if walked[at].needs.is_some() || !best.candidate.is_hit() {
+                    continue;
+                }
+                let tile = self.in_work.tiles[usize::from(places[at].tile)];
+                let ray = primary(&picture.frame, &rays[at], &places[at], &best, sample, tile, self.me);
+                if self.memory.pool.push_to(outbox, RayRecord { settled: 1, page: best.page, ..ray }).is_err() {
+                    break;
+                }
+                given += 1;
+                end -= 1;
+                rays.swap(at, end);
+                walked.swap(at, end);
+                places.swap(at, end);
+            }
+            self.stage = Stage::Shading { sample, next, end };
+        }
+        if given == 0 {
+            // Rays for pages that are here: they take the page with them.
+            given = self.memory.pool.give(self.memory.peers.send(with, 0), usize::from(self.settings.granularity));
+        }
+        if let Some(peer) = self.memory.peers.get(with) {
+            peer.none_to_share = given == 0;
+        }
+    }
+
+    /// Looks at wanted pages, and has their rays go there or the pages come here.
+    pub(super) fn decide(&mut self, now: u64) {
+        let load = u32::from(self.load());
+        // The lane first: nothing else must take its turn.
+        if let Some(ray) = self.aside.filter(|ray| !at_hand(&self.scene.at_hand(&self.store), ray.page)) {
+            self.request(ray.page, true);
+        }
+        let count = self.memory.pool.wanted().len();
+        for _ in 0..count.min(DECISIONS) {
+            let wanted = self.memory.pool.wanted();
+            if wanted.is_empty() {
+                break;
+            }
+            self.looked_at = if self.looked_at < wanted.len() { self.looked_at } else { 0 };
+            let page = wanted[self.looked_at];
+            self.looked_at += 1;
+            let state = *self.memory.pool.page(page);
+            if state.asked {
+                continue;
+            }
+            let entry = self.scene.resident.directory.entries[page as usize];
+            let Some(oldest) = self.memory.pool.oldest(page) else { continue };
+            let (kind, moved) = (oldest.ray_kind(), oldest.moved == 1);
+            let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
+            let situation = Situation {
+                rays: self.memory.pool.waiting(page) as u32,
+                kind,
+                page_bytes: entry.bytes,
+                uses: u32::from(state.uses),
+                owner_is_full: owner.full,
+                owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
+                outbox: owner.outbox.len() as u32,
+                owner_load: u32::from(owner.load),
+                load,
+                granularity: u32::from(self.settings.granularity),
+                ray_ns: self.settings.ray_ns,
+                link: self.settings.link,
+            };
+            let choice = if moved { Choice::Fetch } else { decide(self.settings.policy, &situation) };
+            match choice {
+                Choice::Forward => {
+                    let outbox = self.memory.peers.send(entry.owner, now);
+                    self.memory.pool.move_to(page, outbox);
+                }
+                Choice::Fetch => {
+                    let has_place = self.request(page, false);
+                    if rules::goes_again(has_place, owner.full, situation.owner_traces) {
+                        // No place for the page either: the owner is asked once more.
+                        let outbox = self.memory.peers.send(entry.owner, now);
+                        self.memory.pool.move_to(page, outbox);
+                    }
+                }
+            }
+        }
+        // The next bundle's pages once, when no ray is left that waits for one that was not asked for.
+        let pool = &mut self.memory.pool;
+        let all_asked = (0..pool.wanted().len()).all(|at| {
+            let page = pool.wanted()[at];
+            pool.page(page).asked
+        });
+        if all_asked && !core::mem::replace(&mut self.ahead.tried, true) {
+            for at in 0..self.ahead.pages().len() {
+                let page = self.ahead.pages()[at];
+                if self.store.page(page).is_none() {
+                    self.request(page, false);
+                }
+            }
+        }
+    }
+
+    /// Reserves a place for `page`, and has it asked for.
+    fn request(&mut self, page: u32, for_lane: bool) -> bool {
+        if self.requests.iter().any(|r| r.page == page) {
+            return true;
+        }
+        let requests = usize::from(self.settings.requests).clamp(1, REQUESTS_MAX);
+        if !rules::may_request(self.requests.len(), requests, REQUESTS_MAX, for_lane) {
+            return false;
+        }
+        let owner = self.scene.resident.directory.entries[page as usize].owner;
+        let lost = owner == self.me || self.memory.peers.get(owner).is_none_or(|p| p.lost);
+        let from = if lost { HOST } else { owner };
+        let pool = &self.memory.pool;
+        if !self.store.reserve(page, for_lane, &|p| pool.waiting(p) > 0) {
+            return false;
+        }
+        self.memory.pool.page(page).asked = true;
+        // There is room: the limit was looked at.
+        let _ = self.requests.push(Request { page, from, sent: false });
+        self.high_water.requests = (self.high_water.requests.0.max(self.requests.len()), REQUESTS_MAX + 1);
+        self.high_water.page_bytes = self.high_water.page_bytes.max(self.store.bytes_held());
+        true
+    }
+}
