@@ -98,7 +98,8 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                     let some = scratch.clip(kernels, &scene, &bundle, &mut counts).map(<[_]>::to_vec);
                     if let (Some(all), Some(some)) = (all, some) {
                         let is_page = |leaf: &wide::Leaf| matches!(Child::unpack(leaf.child), Child::Page(_));
-                        let missing: Vec<u32> = some.iter().filter(|leaf| is_page(leaf)).map(|leaf| leaf.page).collect();
+                        let missing: Vec<u32> =
+                            some.iter().filter(|leaf| is_page(leaf)).map(|leaf| leaf.page).collect();
                         assert!(missing.iter().all(|&page| !store.here[page as usize]), "{what}");
                         let (gone, kept): (Vec<_>, Vec<_>) = all.iter().partition(|leaf| missing.contains(&leaf.page));
                         let listed: Vec<_> = some.iter().filter(|leaf| !is_page(leaf)).collect();

@@ -17,7 +17,7 @@ const MEMORY_MAX: u64 = 1 << 40;
 const KIB: u64 = 1024;
 
 /// The most bytes of a page for nodes of `memory` bytes: the largest of 64, 32, 16, 8 and 4 KiB of which the node's page
-/// memory has at least [`PLACES`]; 4 KiB if none is so small. Page memory is what is left when the node has all that it
+/// memory has at least 32 places; 4 KiB if none is so small. Page memory is what is left when the node has all that it
 /// needs for a scene without pages, materials and lights: what those take is known only when the pages are made.
 #[must_use]
 pub fn page_bytes_for(memory: u64, nodes: u16) -> u32 {

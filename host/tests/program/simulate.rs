@@ -43,7 +43,7 @@ fn schedulers_side_by_side_and_packed_scenes() {
 fn how_nodes_work_changes_the_run_and_not_the_film() {
     let folder = Folder::new();
     let usual =
-        "spd:balls:3 --machine gigabit --nodes 4 --memory 128KiB --size 64x64 --spp 1 --scheduler data-parallel";
+        "spd:balls:3 --machine gigabit --nodes 4 --memory 128KiB --size 160x160 --spp 1 --scheduler data-parallel";
     let first = &runs(&folder, usual)[0];
     for more in ["--granularity 2", "--in-system 20", "--pyramid 8", "--voxels 2x2x1", "--page-bytes 8192"] {
         let run = &runs(&folder, &format!("{usual} {more}"))[0];
