@@ -3,6 +3,7 @@
 //! A plan (`core/scheduler/src/plan.rs`) divides one node's memory up; here it is asked about a whole farm, and often
 //! enough to say which figure is the least that does. Memory is in bytes.
 
+use super::owners::first_between;
 use super::{Misfit, PlacedPage, owners};
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
@@ -116,19 +117,6 @@ impl Wanted {
     fn plan(&self, owned_max: Option<u64>) -> Result<Plan, PlanError> {
         Plan::new(self.sizes, self.nodes, self.memory, owned_max, self.policy)
     }
-}
-
-/// A number above `fails` up to `does` that does, while the one before it fails (or is `fails`).
-fn first_between(mut fails: u64, mut does: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    while does - fails > 1 {
-        let middle = fails + (does - fails) / 2;
-        if holds(middle) {
-            does = middle;
-        } else {
-            fails = middle;
-        }
-    }
-    does
 }
 
 #[cfg(test)]

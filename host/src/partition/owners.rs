@@ -63,8 +63,8 @@ pub fn owners(pages: &[PlacedPage], voxels: u32, nodes: u16, memory: u64) -> Res
     Err(Misfit { bytes, nodes, memory, memory_enough, nodes_enough })
 }
 
-/// A number above `fails` up to `does` that does, while the one before it fails.
-fn first_between(mut fails: u64, mut does: u64, holds: impl Fn(u64) -> bool) -> u64 {
+/// A number above `fails` up to `does` that does, while the one before it fails (or is `fails`).
+pub(super) fn first_between(mut fails: u64, mut does: u64, holds: impl Fn(u64) -> bool) -> u64 {
     while does - fails > 1 {
         let middle = fails + (does - fails) / 2;
         if holds(middle) {
