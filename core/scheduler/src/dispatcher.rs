@@ -489,15 +489,17 @@ impl<'m> Dispatcher<'m> {
                 }
             }
         }
-        if self.left() == 0 && self.again.is_empty() && !self.gathering {
-            self.share(link);
-        }
         if self.is_idle() && self.asked {
             for peer in 0..self.nodes.len() {
                 if self.nodes[peer].here && !self.nodes[peer].told {
                     self.nodes[peer].told = send(link, peer as Peer, &Message::Finished { tile: u32::MAX });
                 }
             }
+        }
+        // Who is to hear that nothing is left hears it first: what is shared must not take the room for it for ever.
+        let told = !self.is_idle() || self.nodes.iter().all(|node| !node.here || node.told);
+        if told && self.left() == 0 && self.again.is_empty() && !self.gathering {
+            self.share(link);
         }
     }
 }

@@ -573,10 +573,6 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             self.done.pop_front();
             sent = true;
         }
-        if rules::says_idle(self.helped, self.idle, self.memory.pool.len()) {
-            self.helped = !send(link, self.dispatcher, &Message::Idle);
-            sent |= !self.helped;
-        }
         let open = self.memory.tiles.iter().any(|t| t.stage != TileStage::Free);
         if self.report && self.runs.is_empty() && self.done.is_empty() && self.stage == Stage::Idle && !open {
             let report = Message::Report {
@@ -587,6 +583,11 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             };
             self.report = !send(link, HOST, &report);
             sent |= !self.report;
+        }
+        // Last: the words before it must not wait for room behind it for ever.
+        if rules::says_idle(self.helped, self.idle, self.memory.pool.len()) {
+            self.helped = !send(link, self.dispatcher, &Message::Idle);
+            sent |= !self.helped;
         }
         sent
     }
