@@ -5,6 +5,7 @@ use super::memory::Bundle;
 use super::{DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Store, at_hand, primary};
 use crate::policy::{Choice, Situation, decide};
 use crate::rules;
+use hybray_arena::List;
 use hybray_link::{HOST, Peer};
 use hybray_wire::RayRecord;
 
@@ -106,18 +107,30 @@ impl<P: Store> Node<'_, '_, P> {
             }
         }
         // The next bundle's pages once, when no ray is left that waits for one that was not asked for.
-        let pool = &mut self.memory.pool;
-        let all_asked = (0..pool.wanted().len()).all(|at| {
-            let page = pool.wanted()[at];
-            pool.page(page).asked
-        });
-        if all_asked && !core::mem::replace(&mut self.ahead.tried, true) {
+        if !self.ahead.tried && self.all_wanted_are_asked() {
+            self.ahead.tried = true;
             for at in 0..self.ahead.pages().len() {
                 let page = self.ahead.pages()[at];
                 if self.store.page(page).is_none() {
                     self.request(page, false);
                 }
             }
+        }
+    }
+
+    fn all_wanted_are_asked(&mut self) -> bool {
+        let pool = &mut self.memory.pool;
+        (0..pool.wanted().len()).all(|at| {
+            let page = pool.wanted()[at];
+            pool.page(page).asked
+        })
+    }
+
+    /// Has rays that were to go elsewhere wait here again. Their places were free this moment, so there is room.
+    pub(super) fn wait_again(&mut self, mut list: List) {
+        while let Some(ray) = self.memory.pool.pop(&mut list) {
+            let here = self.store.page(ray.page).is_some();
+            let _ = self.memory.pool.push(ray, here);
         }
     }
 

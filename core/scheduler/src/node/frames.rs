@@ -38,11 +38,7 @@ impl<P: Store> Node<'_, '_, P> {
                     return;
                 }
                 self.traffic.refused += count;
-                while let Some(ray) = self.memory.pool.pop(&mut flight) {
-                    let here = self.store.page(ray.page).is_some();
-                    // Its place was free this moment.
-                    let _ = self.memory.pool.push(ray, here);
-                }
+                self.wait_again(flight);
             }
             _ => {
                 for bytes in view.body.chunks_exact(size_of::<Partial>()) {

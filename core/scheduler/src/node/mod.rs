@@ -149,8 +149,8 @@ struct Run {
 enum Stage {
     /// Nothing: the next bundle may begin.
     Idle,
-    /// Primary rays of sample `sample` from `next` on are still to be shaded.
-    /// Those before `end`, that is: the others were given away.
+    /// Primary rays of sample `sample` from `next` on are still to be shaded, up to `end`: those behind it were given
+    /// away.
     Shading { sample: u16, next: usize, end: usize },
 }
 
@@ -355,14 +355,9 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         let Some(state) = self.memory.peers.get(peer) else { return };
         state.lost = true;
         state.full = false;
-        let mut lists = [core::mem::take(&mut state.outbox), core::mem::take(&mut state.flight)];
-        for list in &mut lists {
-            while let Some(ray) = self.memory.pool.pop(list) {
-                let here = self.store.page(ray.page).is_some();
-                // Its place was free this moment.
-                let _ = self.memory.pool.push(ray, here);
-            }
-        }
+        let (outbox, flight) = (core::mem::take(&mut state.outbox), core::mem::take(&mut state.flight));
+        self.wait_again(outbox);
+        self.wait_again(flight);
         self.memory.server.lost(peer);
         if let Some(owed) = self.memory.owed.get_mut(usize::from(peer)) {
             let mut owed = core::mem::take(owed);
