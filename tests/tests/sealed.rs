@@ -144,7 +144,7 @@ fn message(random: &mut Random, frame: u16) -> Message {
         4 => Message::Took { taken: bits & 1 == 0, load: word as u16 },
         5 => Message::Partials { count: 1 + small as u16 },
         6 => Message::Share { with: number as u16 },
-        7 => Message::Idle,
+        7 => Message::Idle { given: number % 2 == 0 },
         8 => Message::Fetch { page: number },
         9 => Message::Part { page: number, offset: number, bytes: (100 * small) as u16 },
         10 => Message::Tiles { first: number, count: word, epoch: 0 },

@@ -66,6 +66,8 @@ pub struct NodeState {
     asked: u32,
     /// Nodes that it was told to share with, and that are not through with it.
     helpers: u32,
+    /// It had nothing to share, and has not ended a run since.
+    dry: bool,
     tiles_done: u64,
     nanoseconds: u64,
     /// When its first run was sent, to learn what a message costs.
@@ -110,6 +112,10 @@ pub struct Dispatcher<'m> {
     tiles: u32,
     /// Each node begins in its own part of the picture.
     biased: bool,
+    /// Where these parts begin, and where the last ends, if they are not of equal numbers of tiles.
+    bounds: &'m [u32],
+    /// The node that the dispatcher is on; [`HOST`] if it is on none.
+    me: Peer,
     again: heapless::Deque<Run, AGAIN_MAX>,
     /// More tiles to be given out again are on their way here.
     gathering: bool,
@@ -132,6 +138,8 @@ impl<'m> Dispatcher<'m> {
             options,
             tiles: 0,
             biased: false,
+            bounds: &[],
+            me: HOST,
             again: heapless::Deque::new(),
             gathering: false,
             cheapest: u64::MAX,
@@ -148,6 +156,20 @@ impl<'m> Dispatcher<'m> {
         Self { biased, ..self }
     }
 
+    /// Where each node's part of the picture begins, in tiles, and after these where the last one ends: parts that are
+    /// thought to take as long as each other. Bounds that do not rise, or are not one more than nodes, are passed over.
+    #[must_use]
+    pub fn with_parts(self, bounds: &'m [u32]) -> Self {
+        let sound = bounds.len() == self.nodes.len() && bounds.first() == Some(&0) && bounds.is_sorted();
+        if sound { Self { bounds, biased: true, ..self } } else { self }
+    }
+
+    /// On a node: it has less time for tiles than others, and takes none from their parts.
+    #[must_use]
+    pub fn on(self, me: Peer) -> Self {
+        Self { me, ..self }
+    }
+
     /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
     pub fn handle(&mut self, from: Peer, message: &Message, now: u64) {
         match *message {
@@ -162,10 +184,12 @@ impl<'m> Dispatcher<'m> {
             }
             Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
             Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
-            Message::Idle => {
+            Message::Back { with, first, count } => self.back(from, with, first, count),
+            Message::Idle { given } => {
                 let helped = self.nodes.get_mut(usize::from(from)).and_then(|node| node.helping.take());
                 if let Some(helped) = helped.and_then(|helped| self.nodes.get_mut(usize::from(helped))) {
                     helped.helpers = helped.helpers.saturating_sub(1);
+                    helped.dry |= !given;
                 }
             }
             _ => {}
@@ -208,6 +232,30 @@ impl<'m> Dispatcher<'m> {
         }
     }
 
+    /// Tiles that a node has not begun, for one that has nothing to do: they are that node's part of the picture now.
+    fn back(&mut self, from: Peer, with: Peer, first: u32, count: u32) {
+        let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        let is_tail = |run: &&mut Run| {
+            count > 0 && count <= run.count && run.epoch == 0 && first == run.first + (run.count - count)
+        };
+        let Some(run) = node.runs.back_mut().filter(is_tail) else { return };
+        run.count -= count;
+        if run.count == 0 {
+            node.runs.pop_back();
+        }
+        if let Some(helped) = self.nodes.get_mut(usize::from(with)).filter(|node| node.helping == Some(from)) {
+            helped.helping = None;
+            self.nodes[usize::from(from)].helpers -= 1;
+        }
+        // Nobody is told to share before all parts are empty, and each who is helped is given back to once: its own is empty.
+        let is_free = |to: &usize| self.nodes[*to].next == self.nodes[*to].end;
+        let with = usize::from(with).min(self.nodes.len() - 1);
+        match [with].into_iter().chain(0..self.nodes.len()).find(is_free) {
+            Some(to) => (self.nodes[to].next, self.nodes[to].end) = (first, first + count),
+            None => drop(self.again.push_back(Run { first, count, epoch: 0 })),
+        }
+    }
+
     fn done(&mut self, from: Peer, first: u32, count: u32, nanoseconds: u64, now: u64) {
         let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
         let Some(&run) = node.runs.front() else { return };
@@ -216,7 +264,7 @@ impl<'m> Dispatcher<'m> {
         }
         node.runs.pop_front();
         node.tiles_done += u64::from(count);
-        (node.since, node.asked) = (now, 0);
+        (node.since, node.asked, node.dry) = (now, 0, false);
         node.nanoseconds = node.nanoseconds.saturating_add(nanoseconds);
         if !node.measured {
             node.measured = true;
@@ -337,7 +385,16 @@ impl<'m> Dispatcher<'m> {
             };
             // What a node can do is not known before it has done something, and only as far as it has.
             let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
-            if shares.nodes == 1 { left } else { chunk(&shares).min(proven) }
+            // Half of a part that is thought to take as long as all others at a time: what is not begun comes back if others
+            // have nothing to do before.
+            let half = (node.end - node.next) / 2;
+            if shares.nodes == 1 {
+                left
+            } else if !self.bounds.is_empty() && half > atomic {
+                half
+            } else {
+                chunk(&shares).min(proven)
+            }
         };
         Some(self.cut(peer, count))
     }
@@ -352,7 +409,9 @@ impl<'m> Dispatcher<'m> {
     fn divide(&mut self) {
         let parts = (self.nodes.len() as u32).saturating_sub(1).max(1);
         let tiles = self.tiles;
-        let bound = |part: u32| (u64::from(tiles) * u64::from(part) / u64::from(parts)) as u32 / 4 * 4;
+        let bounds = self.bounds;
+        let even = |part: u32| (u64::from(tiles) * u64::from(part) / u64::from(parts)) as u32 / 4 * 4;
+        let bound = |part: u32| bounds.get(part as usize).map_or_else(|| even(part), |&bound| bound.min(tiles));
         for (peer, node) in (0..).zip(self.nodes.iter_mut()) {
             (node.next, node.end) = match (self.biased, peer) {
                 (false, 0) => (0, tiles),
@@ -429,7 +488,7 @@ impl<'m> Dispatcher<'m> {
             };
             let may_be = |peer: &usize| {
                 let node = &self.nodes[*peer];
-                *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS
+                *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS && !node.dry
             };
             let Some(peer) = (1..count).filter(may_be).min_by_key(key) else { return };
             if send(link, peer as Peer, &Message::Share { with: idle as Peer }) {
@@ -469,10 +528,16 @@ impl<'m> Dispatcher<'m> {
             return;
         }
         let mut crew = self.crew();
+        let all_here = crew.here == self.sharing();
         // First one each, then the second: a node's next run is no reason for another to have none.
         for wanted in 1..=AHEAD {
             for peer in 0..self.nodes.len() {
-                if !self.nodes[peer].here || self.nodes[peer].runs.len() >= wanted {
+                let node = &self.nodes[peer];
+                // The first run is what a node waits for. Where the dispatcher is near, the second can wait until all have one.
+                let first = wanted == 1 || all_here || node.tiles_done > 0 || self.me == HOST;
+                let has_no_part =
+                    self.biased && self.me != HOST && peer == usize::from(self.me) && node.next == node.end;
+                if !node.here || node.runs.len() >= wanted || !first || (has_no_part && crew.here > 1) {
                     continue;
                 }
                 let Some(run) = self.next_run(peer, &crew) else { continue };

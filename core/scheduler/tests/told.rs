@@ -36,6 +36,11 @@ impl Link for Sent {
 
 /// What node 1 sends after `message` from `from`, besides its greetings.
 fn check(from: Peer, message: Message, expected: &[(Peer, Message)]) {
+    check_with(1, &[], from, message, expected);
+}
+
+/// The same, when it was given `runs` of a picture of so many tiles, and has begun none.
+fn check_with(tiles: u32, runs: &[Message], from: Peer, message: Message, expected: &[(Peer, Message)]) {
     let toy = Toy::new();
     let pages = toy.open();
     let limits = Limits { peers: 3, pages: 1, rays: 8, tiles: 4, partials: 4 };
@@ -44,21 +49,29 @@ fn check(from: Peer, message: Message, expected: &[(Peer, Message)]) {
     let (scene, settings) = (toy.scene(&pages), Settings::default());
     let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
     let mut link = Sent::default();
-    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
+    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8 * tiles, 8, 1)), body: &[] });
     node.poll(&mut link, 0);
     link.0.clear();
+    runs.iter().for_each(|run| node.handle(HOST, &View { message: *run, body: &[] }));
     let body = vec![0; message.body_bytes()];
     node.handle(from, &View { message, body: &body });
     for now in 1..4 {
         node.step(&mut || 0);
         node.poll(&mut link, now);
     }
+    let done = |message: Message| match message {
+        Message::Done { first, count, .. } => Message::Done { first, count, nanoseconds: 0 },
+        Message::Rays { rays, shadows, .. } => Message::Rays { rays, shadows, load: 0 },
+        other => other,
+    };
+    link.0.retain(|(_, message)| !matches!(message, Message::Contributions { .. }));
+    link.0.iter_mut().for_each(|(_, message)| *message = done(*message));
     assert_eq!(link.0, expected);
 }
 
 #[test]
 fn who_refuses_rays_says_when_it_is_idle() {
-    let told = [(2, Message::Took { taken: false, load: 0 }), (HOST, Message::Idle)];
+    let told = [(2, Message::Took { taken: false, load: 0 }), (HOST, Message::Idle { given: true })];
     check(2, Message::Rays { rays: 9, shadows: 0, load: 0 }, &told);
 }
 
@@ -69,5 +82,20 @@ fn who_has_nothing_to_share_says_so() {
 
 #[test]
 fn who_is_given_nothing_says_that_it_is_idle() {
-    check(2, Message::Rays { rays: 0, shadows: 0, load: 0 }, &[(HOST, Message::Idle)]);
+    check(2, Message::Rays { rays: 0, shadows: 0, load: 0 }, &[(HOST, Message::Idle { given: false })]);
+}
+
+/// Half of the tiles that are not begun, from the end, for node 2; and the run is done so much sooner.
+#[test]
+fn who_has_tiles_that_are_not_begun_gives_half_of_them_back() {
+    let run = |first, count, epoch| Message::Tiles { first, count, epoch };
+    let done = |first, count| (HOST, Message::Done { first, count, nanoseconds: 0 });
+    let back = |first, count| (HOST, Message::Back { with: 2, first, count });
+    let share = Message::Share { with: 2 };
+    check_with(5, &[run(0, 5, 0)], HOST, share, &[back(3, 2), done(0, 3)]);
+    check_with(5, &[run(0, 2, 0), run(2, 3, 0)], HOST, share, &[back(2, 3), done(0, 2)]);
+    // One that is traced again stays: others may know of it under another epoch. So does a node's only tile.
+    let nothing = (2, Message::Rays { rays: 0, shadows: 0, load: 0 });
+    check_with(5, &[run(0, 3, 1)], HOST, share, &[nothing, done(0, 3)]);
+    check_with(5, &[run(0, 1, 0)], HOST, share, &[nothing, done(0, 1)]);
 }

@@ -177,7 +177,19 @@ pub enum Message {
         with: u16,
     },
     /// Node to dispatcher: what others shared with me is done.
-    Idle,
+    Idle {
+        /// Whether there was anything.
+        given: bool,
+    },
+    /// Node to dispatcher: the last tiles of my last run, which I have not begun and that node is to have.
+    Back {
+        /// Who.
+        with: u16,
+        /// The first of them.
+        first: u32,
+        /// How many.
+        count: u32,
+    },
 }
 
 /// Bytes of the longest head.
@@ -327,7 +339,8 @@ mod tests {
         check(Message::Took { taken: false, load: u16::MAX });
         check(Message::Partials { count: 400 });
         check(Message::Share { with: u16::MAX });
-        check(Message::Idle);
+        check(Message::Idle { given: true });
+        check(Message::Back { with: u16::MAX, first: u32::MAX, count: u32::MAX });
         check(Message::Fetch { page: u32::MAX });
         check(Message::Part { page: u32::MAX, offset: u32::MAX, bytes: 4096 });
         check(Message::Rays { rays: 186, shadows: 0, load: 0 });

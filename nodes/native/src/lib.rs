@@ -225,7 +225,7 @@ fn run(
             threads.spawn(move || {
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
-                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options).biased(biased));
+                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options).on(peer).biased(biased));
                 let did = node(peer, &mut link, dispatcher, clock);
                 worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });

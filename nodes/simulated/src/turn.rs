@@ -32,7 +32,7 @@ fn kind(message: Option<&Message>) -> usize {
         Some(Message::Fetch { .. }) => 4,
         Some(Message::Part { .. }) => 5,
         Some(Message::Tiles { .. } | Message::Done { .. }) => 6,
-        Some(Message::Share { .. } | Message::Idle) => 7,
+        Some(Message::Share { .. } | Message::Idle { .. } | Message::Back { .. }) => 7,
         _ => 8,
     }
 }

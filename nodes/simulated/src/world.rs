@@ -72,7 +72,9 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             farm,
             network: Network::new(&farm.machine.network(farm.nodes), peers),
             master,
-            dispatcher: Dispatcher::new(states, farm.options).biased(farm.settings.policy != Policy::DemandDriven),
+            dispatcher: Dispatcher::new(states, farm.options)
+                .on(farm.dispatcher)
+                .biased(farm.settings.policy != Policy::DemandDriven),
             server,
             pages,
             seats: workers

@@ -346,11 +346,11 @@ fn who_has_nothing_is_shared_with_once_at_a_time() {
     assert_eq!(wire.shared, [(1, 3)]);
     dispatcher.poll(&mut wire, 1);
     assert_eq!(wire.shared.len(), 1);
-    dispatcher.handle(3, &Message::Idle, 2);
+    dispatcher.handle(3, &Message::Idle { given: true }, 2);
     dispatcher.poll(&mut wire, 2);
     assert_eq!(wire.shared[1..], [(2, 3)]);
     // Who has no run any more may still have rays; but not who is being helped.
-    dispatcher.handle(3, &Message::Idle, 3);
+    dispatcher.handle(3, &Message::Idle { given: true }, 3);
     for (peer, first, count, _) in wire.sent.clone() {
         dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
     }
@@ -359,4 +359,76 @@ fn who_has_nothing_is_shared_with_once_at_a_time() {
     dispatcher.poll(&mut wire, 5);
     assert_eq!(wire.shared.len(), 4);
     assert_eq!(wire.told, [1, 2, 3]);
+}
+
+/// Two of the tiles that node 1 has not begun go to node 3, and the run ends so much shorter. What is not the end of a run
+/// is passed over.
+#[test]
+fn what_is_not_begun_goes_to_who_has_nothing() {
+    let mut nodes = vec![NodeState::default(); 4];
+    let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
+    let mut wire = Wire::new();
+    dispatcher.handle(HOST, &begin(8), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (2, 4, 4, 0)]);
+    assert_eq!(wire.shared, [(1, 3)]);
+    for (from, first, count) in [(1, 2, 1), (1, 0, 5), (1, 4, 0), (1, 6, 2), (2, 2, 2), (3, 2, 2), (9, 2, 2)] {
+        dispatcher.handle(from, &Message::Back { with: 3, first, count }, 1);
+        dispatcher.poll(&mut wire, 1);
+        assert_eq!(wire.take(), [], "{from}: {first}, {count}");
+    }
+    dispatcher.handle(1, &Message::Back { with: 3, first: 2, count: 2 }, 2);
+    dispatcher.poll(&mut wire, 2);
+    assert_eq!(wire.take(), [(3, 2, 2, 0)]);
+    for (peer, first, count) in [(1, 0, 4), (1, 0, 2), (2, 4, 4)] {
+        assert!(!dispatcher.is_idle());
+        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
+    }
+    assert!(!dispatcher.is_idle());
+    dispatcher.handle(3, &Message::Done { first: 2, count: 2, nanoseconds: 5 }, 3);
+    assert!(dispatcher.is_idle());
+}
+
+/// Who had nothing to share is not told to again before it has ended a run.
+#[test]
+fn who_had_nothing_to_share_is_left_alone() {
+    let mut nodes = vec![NodeState::default(); 3];
+    let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
+    let mut wire = Wire::new();
+    dispatcher.handle(HOST, &begin(8), 0);
+    dispatcher.handle(1, &HELLO, 0);
+    dispatcher.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (1, 4, 4, 0)]);
+    dispatcher.handle(2, &HELLO, 0);
+    dispatcher.poll(&mut wire, 0);
+    assert_eq!(wire.shared, [(1, 2)]);
+    dispatcher.handle(2, &Message::Idle { given: false }, 1);
+    dispatcher.poll(&mut wire, 1);
+    assert_eq!(wire.shared, [(1, 2)]);
+    dispatcher.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 5 }, 2);
+    dispatcher.poll(&mut wire, 2);
+    assert_eq!(wire.shared, [(1, 2), (1, 2)]);
+}
+
+/// Parts that are thought to be equal: each node has half of its own first; who gives tiles out has only its own.
+#[test]
+fn parts_are_given_out_by_halves() {
+    let mut nodes = vec![NodeState::default(); 4];
+    let mut dispatcher =
+        Dispatcher::new(&mut nodes, Options { atomic: Some(1), ..FIXED }).on(1).with_parts(&[0, 4, 20, 32]);
+    let mut wire = Wire::new();
+    dispatcher.handle(HOST, &begin(32), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.poll(&mut wire, 0);
+    let given = wire.take();
+    assert_eq!(given[..3], [(1, 0, 2, 0), (2, 4, 8, 0), (3, 20, 8, 0)]);
+    assert_eq!(given[3..], [(1, 2, 1, 0), (2, 12, 1, 0), (3, 28, 1, 0)]);
+    // All that is left after its own last tile is others'.
+    for (first, count) in [(0, 2), (2, 1), (3, 1)] {
+        dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }, 1);
+        dispatcher.poll(&mut wire, 1);
+    }
+    assert_eq!(wire.take(), [(1, 3, 1, 0)]);
+    assert!(dispatcher.left() > 0);
 }

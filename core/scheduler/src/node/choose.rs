@@ -2,7 +2,7 @@
 //! a node that has none.
 
 use super::memory::Bundle;
-use super::{DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Store, at_hand, primary};
+use super::{Back, DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Store, at_hand, primary};
 use crate::policy::{Choice, Situation, decide};
 use crate::rules;
 use hybray_arena::List;
@@ -13,11 +13,14 @@ impl<P: Store> Node<'_, '_, P> {
     /// Gives half of the bundle's rays that are still to be shaded, and that hit something, to a node that has nothing
     /// to do; or lets it know that there are none.
     pub(super) fn share(&mut self, with: Peer) {
-        let Some(picture) = &self.picture else { return };
-        let Bundle { rays, walked, places, .. } = &mut *self.memory.bundle;
         if with == self.me || with == HOST || self.memory.peers.get(with).is_none_or(|p| p.lost) {
             return;
         }
+        if self.give_tiles(with) {
+            return;
+        }
+        let Some(picture) = &self.picture else { return };
+        let Bundle { rays, walked, places, .. } = &mut *self.memory.bundle;
         let outbox = self.memory.peers.send(with, 0);
         let mut given = 0;
         if let Stage::Shading { sample, next, mut end } = self.stage {
@@ -50,6 +53,27 @@ impl<P: Store> Node<'_, '_, P> {
         if let Some(peer) = self.memory.peers.get(with) {
             peer.none_to_share = given == 0;
         }
+    }
+
+    /// Gives half of the tiles that are not begun back to the dispatcher, for a node that has nothing to do.
+    fn give_tiles(&mut self, with: Peer) -> bool {
+        let begun = if self.stage != Stage::Idle && self.in_work.of_run { self.in_work.count as u32 } else { 0 };
+        let left = self.runs.iter().map(|run| run.count - run.done).sum::<u32>() - begun;
+        let several = self.runs.len() > 1;
+        let Some(last) = self.runs.back_mut().filter(|run| run.epoch == 0 && self.back.is_none()) else { return false };
+        let lasts = if several { last.count } else { left };
+        // A run of which something is done must be ended by its own tiles.
+        let half = if several || begun > 0 { left.div_ceil(2) } else { left / 2 };
+        let count = half.min(lasts);
+        if count == 0 {
+            return false;
+        }
+        last.count -= count;
+        self.back = Some(Back { with, first: last.first + last.count, count });
+        if last.count == 0 {
+            self.runs.pop_back();
+        }
+        true
     }
 
     /// Looks at wanted pages, and has their rays go there or the pages come here.

@@ -54,13 +54,14 @@ impl<P: Store> Node<'_, '_, P> {
     fn handle_records(&mut self, from: Peer, rays: u16, shadows: u16, body: &[u8]) {
         let (rays, shadows) = (usize::from(rays), usize::from(shadows));
         if rays + shadows == 0 {
-            self.helped = true;
+            (self.helped, self.given) = (true, false);
             return;
         }
         let pool = &self.memory.pool;
         let taken = self.picture.is_some() && rules::takes(rays + shadows, pool.free(), pool.capacity());
         self.memory.peers.answer(from, taken);
         self.helped |= rules::was_helped(taken, false);
+        self.given = true;
         if !taken {
             return;
         }

@@ -144,6 +144,14 @@ struct Run {
     nanoseconds: u64,
 }
 
+/// Tiles that go back to the dispatcher.
+#[derive(Clone, Copy)]
+struct Back {
+    with: Peer,
+    first: u32,
+    count: u32,
+}
+
 /// What of the bundle is in work.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -208,6 +216,10 @@ pub struct Node<'m, 's, P: Store> {
     idle: bool,
     /// Somebody shares with this node: the dispatcher is told when that is done.
     helped: bool,
+    /// Tiles that it was given and has not begun, to go back for a node that has nothing to do.
+    back: Option<Back>,
+    /// The last one who was to share had something.
+    given: bool,
     tiles: u32,
     /// Tiles whose sums have gone to the film.
     sent_tiles: u32,
@@ -256,6 +268,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             high_water: HighWater::default(),
             idle: true,
             helped: false,
+            given: false,
+            back: None,
             tiles: 0,
             sent_tiles: 0,
             runs_given: 0,
@@ -341,6 +355,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     fn stop(&mut self) {
         self.runs.clear();
         self.done.clear();
+        self.back = None;
         self.stage = Stage::Idle;
         (self.depth, self.aside) = (0, None);
         self.memory.tiles.fill(OpenTile::FREE);
@@ -408,6 +423,12 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             lists: owed,
             owing,
             counts: Counts::default(),
+        };
+        // With a budget the end of a run is begun a tile at a time: what is not begun can still be given to others.
+        let square_from = match self.settings.bundle_tiles {
+            0..4 => u32::MAX,
+            _ if pool.capacity() == 0 => 0,
+            _ => 2 * TILES as u32,
         };
         let mut units = 0;
         let mut bundles = 0;
@@ -500,15 +521,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     let room = pool.capacity() == 0
                         || rules::may_begin(pool.len(), pool.capacity(), self.settings.in_system as usize);
                     // The next bundle's pages come first, if they can be had.
-                    let next = next_bundle(picture, &self.runs, None, self.settings.bundle_tiles).filter(|_| room);
+                    let next = next_bundle(picture, &self.runs, None, square_from).filter(|_| room);
                     if pool.capacity() > 0
                         && let Some(next) = next
                     {
                         let kernels = self.kernels;
                         self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
                     }
-                    let begun =
-                        if room { begin(picture, &self.runs, sums.tiles, self.settings.bundle_tiles) } else { None };
+                    let begun = if room { begin(picture, &self.runs, sums.tiles, square_from) } else { None };
                     let Some(begun) = begun else {
                         units -= 1;
                         break;
@@ -517,7 +537,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     let count = begun.place(picture, places);
                     self.in_work = InWork { rays: count, ..begun };
                     self.ahead.begin();
-                    let next = next_bundle(picture, &self.runs, Some(&begun), self.settings.bundle_tiles);
+                    let next = next_bundle(picture, &self.runs, Some(&begun), square_from);
                     if pool.capacity() > 0
                         && let Some(next) = next
                     {
@@ -560,7 +580,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             sent |= self.forward(link, now);
         }
         sent |= self.send_tiles(link);
-        while let Some(run) = self.done.front() {
+        if let Some(Back { with, first, count }) = self.back
+            && send(link, self.dispatcher, &Message::Back { with, first, count })
+        {
+            self.back = None;
+            sent = true;
+        }
+        // The dispatcher must know how long a run is before it hears that it is done.
+        while let Some(run) = self.done.front().filter(|_| self.back.is_none()) {
             let done = Message::Done { first: run.first, count: run.count, nanoseconds: run.nanoseconds };
             if !send(link, self.dispatcher, &done) {
                 break;
@@ -569,7 +596,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             sent = true;
         }
         let open = self.memory.tiles.iter().any(|t| t.stage != TileStage::Free);
-        if self.report && self.runs.is_empty() && self.done.is_empty() && self.stage == Stage::Idle && !open {
+        let told = self.done.is_empty() && self.back.is_none();
+        if self.report && self.runs.is_empty() && told && self.stage == Stage::Idle && !open {
             let report = Message::Report {
                 counts: self.counts,
                 tiles: self.tiles,
@@ -581,7 +609,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         }
         // Last: the words before it must not wait for room behind it for ever.
         if rules::says_idle(self.helped, self.idle, self.memory.pool.len()) {
-            self.helped = !send(link, self.dispatcher, &Message::Idle);
+            self.helped = !send(link, self.dispatcher, &Message::Idle { given: self.given });
             sent |= !self.helped;
         }
         sent
@@ -666,7 +694,7 @@ fn begin(
     picture: &Picture,
     runs: &heapless::Deque<Run, RUNS>,
     tiles: &mut [OpenTile],
-    bundle_tiles: u8,
+    square_from: u32,
 ) -> Option<InWork> {
     let mut work = InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false };
     if let Some(tile) = tiles.iter_mut().find(|t| t.stage == TileStage::Again) {
@@ -678,7 +706,7 @@ fn begin(
     }
     let run = runs.front()?;
     let first = run.first + run.done;
-    let count = if bundle_tiles >= 4 { picture.map.square(first, run.count - run.done) } else { 1 } as usize;
+    let count = bundle_of(picture, first, run.count - run.done, square_from) as usize;
     if tiles.iter().filter(|t| t.stage == TileStage::Free).count() < count {
         return None;
     }
@@ -698,7 +726,7 @@ fn next_bundle(
     picture: &Picture,
     runs: &heapless::Deque<Run, RUNS>,
     begun: Option<&InWork>,
-    bundle_tiles: u8,
+    square_from: u32,
 ) -> Option<(u32, u32)> {
     let after = begun.filter(|work| work.of_run).map_or(0, |work| work.count as u32);
     let mut runs = runs.iter();
@@ -707,7 +735,12 @@ fn next_bundle(
         0 => runs.next().map(|run| (run.first, run.count))?,
         left => (run.first + run.done + after, left),
     };
-    Some((first, if bundle_tiles >= 4 { picture.map.square(first, left) } else { 1 }))
+    Some((first, bundle_of(picture, first, left, square_from)))
+}
+
+/// Tiles of the bundle that begins with tile `first`, of a run that has `left` tiles: a square if that is enough of them.
+fn bundle_of(picture: &Picture, first: u32, left: u32, square_from: u32) -> u32 {
+    if left >= square_from { picture.map.square(first, left) } else { 1 }
 }
 
 impl InWork {

@@ -303,7 +303,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let mut states = vec![NodeState::default(); peers];
     let (mut host_dispatcher, mut node_dispatcher) = match plan.dispatcher {
         HOST => (Some(Dispatcher::new(&mut states, plan.options)), None),
-        _ => (None, Some(Dispatcher::new(&mut states, plan.options))),
+        _ => (None, Some(Dispatcher::new(&mut states, plan.options).on(plan.dispatcher))),
     };
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1;
