@@ -1,6 +1,6 @@
 //! The dispatcher: hands out runs of tiles (POV||Ray, section 2).
 //!
-//! It needs to know nothing but how many tiles there are, so it can run on a node near the workers (section 2.2). Each
+//! It needs to know nothing but how many tiles there are, and which of them are finished already, so it can run on a node near the workers (section 2.2). Each
 //! node has its next run before it ends the last; T, the nodes' rates and the least useful run are learned on the way.
 //!
 //! The rule bounds the imbalance only if no run takes more than T times as long as another, and if nobody holds back
@@ -57,6 +57,8 @@ pub struct NodeState {
     /// What is left of its part of the picture.
     next: u32,
     end: u32,
+    /// Tiles of it that were finished before.
+    kept: u32,
     /// Runs in its hands, the oldest first.
     runs: Runs,
     /// It has nothing to do, and this peer was told to share with it.
@@ -78,6 +80,26 @@ pub struct NodeState {
 impl NodeState {
     fn in_hand(&self) -> u32 {
         self.runs.iter().map(|run| run.count).sum()
+    }
+
+    /// Tiles of its part that were never given out.
+    fn left(&self) -> u32 {
+        self.end - self.next - self.kept
+    }
+}
+
+/// A bit for each tile.
+struct Tiles<'m>(&'m mut [u64]);
+
+impl Tiles<'_> {
+    fn has(&self, tile: u32) -> bool {
+        self.0.get(tile as usize / 64).is_some_and(|word| word >> (tile % 64) & 1 == 1)
+    }
+
+    /// Puts in a run of tiles, as far as there is room.
+    fn put(&mut self, first: u32, count: u32) {
+        let end = (u64::from(first) + u64::from(count)).min(64 * self.0.len() as u64);
+        (u64::from(first)..end).for_each(|tile| self.0[tile as usize / 64] |= 1 << (tile % 64));
     }
 }
 
@@ -110,6 +132,10 @@ pub struct Dispatcher<'m> {
     options: Options,
     /// Tiles of the picture; 0 until it begins.
     tiles: u32,
+    /// Tiles to be given out: all, but for those that are kept.
+    wanted: u32,
+    /// Tiles that were finished before.
+    kept: Tiles<'m>,
     /// Each node begins in its own part of the picture.
     biased: bool,
     /// Where these parts begin, and where the last ends, if they are not of equal numbers of tiles.
@@ -125,7 +151,6 @@ pub struct Dispatcher<'m> {
     runs_done: u32,
     /// Least time that a run's messages were seen to take.
     overhead: u64,
-    asked: bool,
 }
 
 impl<'m> Dispatcher<'m> {
@@ -137,6 +162,8 @@ impl<'m> Dispatcher<'m> {
             nodes,
             options,
             tiles: 0,
+            wanted: 0,
+            kept: Tiles(&mut []),
             biased: false,
             bounds: &[],
             me: HOST,
@@ -146,7 +173,6 @@ impl<'m> Dispatcher<'m> {
             dearest: 0,
             runs_done: 0,
             overhead: u64::MAX,
-            asked: false,
         }
     }
 
@@ -170,13 +196,23 @@ impl<'m> Dispatcher<'m> {
         Self { me, ..self }
     }
 
+    /// For pictures of which some tiles may be finished already: a bit of `kept` for each tile that it is to know of so.
+    /// Others of these are traced for nothing: the film has them and takes no more.
+    #[must_use]
+    pub fn keeping(self, kept: &'m mut [u64]) -> Self {
+        kept.fill(0);
+        Self { kept: Tiles(kept), ..self }
+    }
+
     /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
     pub fn handle(&mut self, from: Peer, message: &Message, now: u64) {
         match *message {
             Message::Begin(frame) if from == HOST => {
                 self.tiles = hybray_wire::TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
                 self.divide();
+                self.wanted = self.left();
             }
+            Message::Kept { first, count } if from == HOST && self.tiles == 0 => self.kept.put(first, count),
             Message::Hello { .. } => {
                 if let Some(node) = self.nodes.get_mut(usize::from(from)) {
                     node.here = !node.lost;
@@ -248,10 +284,13 @@ impl<'m> Dispatcher<'m> {
             self.nodes[usize::from(from)].helpers -= 1;
         }
         // Nobody is told to share before all parts are empty, and each who is helped is given back to once: its own is empty.
-        let is_free = |to: &usize| self.nodes[*to].next == self.nodes[*to].end;
+        let is_free = |to: &usize| self.nodes[*to].left() == 0;
         let with = usize::from(with).min(self.nodes.len() - 1);
         match [with].into_iter().chain(0..self.nodes.len()).find(is_free) {
-            Some(to) => (self.nodes[to].next, self.nodes[to].end) = (first, first + count),
+            Some(to) => {
+                let part = &mut self.nodes[to];
+                (part.next, part.end, part.kept) = (first, first + count, 0);
+            }
             None => drop(self.again.push_back(Run { first, count, epoch: 0 })),
         }
     }
@@ -305,7 +344,7 @@ impl<'m> Dispatcher<'m> {
             .iter()
             .fold((0, 0), |(t, n), node| (t + node.tiles_done, u64::saturating_add(n, node.nanoseconds)));
         let nodes = self.sharing();
-        let most = (self.tiles / (16 * nodes)).max(1);
+        let most = (self.wanted / (16 * nodes)).max(1);
         if tiles == 0 || self.overhead == u64::MAX {
             return most.min(4);
         }
@@ -387,7 +426,7 @@ impl<'m> Dispatcher<'m> {
             let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
             // Half of a part that is thought to take as long as all others at a time: what is not begun comes back if others
             // have nothing to do before.
-            let half = (node.end - node.next) / 2;
+            let half = node.left() / 2;
             if shares.nodes == 1 {
                 left
             } else if !self.bounds.is_empty() && half > atomic {
@@ -401,7 +440,7 @@ impl<'m> Dispatcher<'m> {
 
     /// Tiles that were never given out.
     fn left(&self) -> u32 {
-        self.nodes.iter().map(|node| node.end - node.next).sum()
+        self.nodes.iter().map(NodeState::left).sum()
     }
 
     /// Parts of the picture that tiles are given out from: one for all, which the host's entry holds, or one for each
@@ -418,29 +457,40 @@ impl<'m> Dispatcher<'m> {
                 (true, 1..) => (bound(peer - 1), if peer == parts { tiles } else { bound(peer) }),
                 _ => (0, 0),
             };
+            node.kept = (node.next..node.end).filter(|&tile| self.kept.has(tile)).count() as u32;
         }
     }
 
-    /// A run of `count` tiles, or of what its part has left: from the node's own part or, where that is empty, the end of
+    /// A run of `count` tiles, or fewer up to a tile that is kept or where its part ends: from the node's own part or, where that is empty, the end of
     /// the one that has most left.
     fn cut(&mut self, peer: usize, count: u32) -> Run {
-        let has = |node: &NodeState| node.end - node.next;
         let own = if self.biased { peer } else { 0 };
-        let others = has(&self.nodes[own]) == 0;
+        let others = self.nodes[own].left() == 0;
         let part =
-            if others { (0..self.nodes.len()).rev().max_by_key(|&p| has(&self.nodes[p])).unwrap_or(own) } else { own };
+            if others { (0..self.nodes.len()).rev().max_by_key(|&p| self.nodes[p].left()).unwrap_or(own) } else { own };
         let part = &mut self.nodes[part];
+        let kept = &self.kept;
+        while part.kept > 0 && kept.has(if others { part.end - 1 } else { part.next }) {
+            part.kept -= 1;
+            if others { part.end -= 1 } else { part.next += 1 }
+        }
         let mut count = count.min(part.end - part.next);
         // What is left begins at a square, unless it would be nothing.
         if others {
             if count >= 4 {
                 count = part.end - ((part.end - count) / 4 * 4).max(part.next);
             }
+            if part.kept > 0 {
+                count = (part.end - count..part.end).rev().take_while(|&tile| !kept.has(tile)).count() as u32;
+            }
             part.end -= count;
             return Run { first: part.end, count, epoch: 0 };
         }
         if count >= 4 {
             count = (part.next + count).next_multiple_of(4).min(part.end) - part.next;
+        }
+        if part.kept > 0 {
+            count = (part.next..part.next + count).take_while(|&tile| !kept.has(tile)).count() as u32;
         }
         part.next += count;
         Run { first: part.next - count, count, epoch: 0 }
@@ -535,8 +585,7 @@ impl<'m> Dispatcher<'m> {
                 let node = &self.nodes[peer];
                 // The first run is what a node waits for. Where the dispatcher is near, the second can wait until all have one.
                 let first = wanted == 1 || all_here || node.tiles_done > 0 || self.me == HOST;
-                let has_no_part =
-                    self.biased && self.me != HOST && peer == usize::from(self.me) && node.next == node.end;
+                let has_no_part = self.biased && self.me != HOST && peer == usize::from(self.me) && node.left() == 0;
                 if !node.here || node.runs.len() >= wanted || !first || (has_no_part && crew.here > 1) {
                     continue;
                 }
@@ -548,13 +597,12 @@ impl<'m> Dispatcher<'m> {
                     crew.rates += if node.runs.is_empty() { crew.rate(node) } else { 0.0 };
                     node.first_sent_at.get_or_insert(now);
                     let _ = node.runs.push_back(run);
-                    self.asked = true;
                 } else {
                     self.give_back(run);
                 }
             }
         }
-        if self.is_idle() && self.asked {
+        if self.is_idle() {
             for peer in 0..self.nodes.len() {
                 if self.nodes[peer].here && !self.nodes[peer].told {
                     self.nodes[peer].told = send(link, peer as Peer, &Message::Finished { tile: u32::MAX });

@@ -2,7 +2,7 @@
 
 use crate::ledger::Balance;
 use hybray_shading::id;
-use hybray_wire::{Frame, TileMap};
+use hybray_wire::{Frame, Tile, TileMap};
 
 /// The unit of the film: 2 to a power. A contribution is at most 2^24 units of radiance times the exposure that the
 /// step is chosen for; sums that would pass 2^64 steps stay there, in any order, since nothing is negative.
@@ -151,15 +151,9 @@ impl<'m> Film<'m> {
         entry: u64,
         values: &[u8],
     ) -> Result<bool, FilmError> {
-        let wrong = FilmError::Tile(tile);
-        if tile >= self.map.len() {
-            return Err(wrong);
-        }
-        let place = self.map.tile(tile);
-        if (u32::from(shape.0), u32::from(shape.1)) != (place.width, place.height)
-            || values.len() != place.pixels() * 24
-        {
-            return Err(wrong);
+        let place = self.place(tile, values)?;
+        if (u32::from(shape.0), u32::from(shape.1)) != (place.width, place.height) {
+            return Err(FilmError::Tile(tile));
         }
         let state = self.tiles[tile as usize];
         if state.finished || epoch < state.epoch {
@@ -168,6 +162,37 @@ impl<'m> Film<'m> {
         if epoch > state.epoch || !state.open {
             self.open(tile, epoch);
         }
+        self.add_values(tile, values);
+        let state = &mut self.tiles[tile as usize];
+        state.balance.add(entry);
+        state.finished = state.balance.is_zero();
+        self.finished += u32::from(state.finished);
+        Ok(state.finished)
+    }
+
+    /// Puts in a tile that was finished before, in another film of the same picture: `values` as [`Film::tile_sums`] gave
+    /// them there, each in 8 bytes, little-endian. A tile that is finished here stays as it is.
+    ///
+    /// # Errors
+    /// If there is no such tile: nothing is changed.
+    pub fn keep(&mut self, tile: u32, values: &[u8]) -> Result<(), FilmError> {
+        self.place(tile, values)?;
+        if !self.tile_is_finished(tile) {
+            self.empty(tile);
+            self.add_values(tile, values);
+            self.tiles[tile as usize] = TileState { balance: Balance::ZERO, epoch: 0, open: true, finished: true };
+            self.finished += 1;
+        }
+        Ok(())
+    }
+
+    /// Where a tile is, if there is one and `values` are as many as its pixels take.
+    fn place(&self, tile: u32, values: &[u8]) -> Result<Tile, FilmError> {
+        let place = (tile < self.map.len()).then(|| self.map.tile(tile));
+        place.filter(|place| values.len() == place.pixels() * 24).ok_or(FilmError::Tile(tile))
+    }
+
+    fn add_values(&mut self, tile: u32, values: &[u8]) {
         for (pixel, value) in self.pixels(tile).zip(values.chunks_exact(24)) {
             for (sum, bytes) in self.sums[pixel as usize].iter_mut().zip(value.chunks_exact(8)) {
                 let mut steps = [0; 8];
@@ -175,11 +200,12 @@ impl<'m> Film<'m> {
                 *sum = sum.saturating_add(u64::from_le_bytes(steps));
             }
         }
-        let state = &mut self.tiles[tile as usize];
-        state.balance.add(entry);
-        state.finished = state.balance.is_zero();
-        self.finished += u32::from(state.finished);
-        Ok(state.finished)
+    }
+
+    fn empty(&mut self, tile: u32) {
+        for pixel in self.pixels(tile) {
+            self.sums[pixel as usize] = [0; 3];
+        }
     }
 
     /// Empties a tile and debits its primaries, under `epoch`. A finished tile, or none of this picture's, stays as it
@@ -191,10 +217,14 @@ impl<'m> Film<'m> {
         let (seed, samples) = (self.seed, u32::from(self.samples));
         let ids = self.pixels(tile).flat_map(|pixel| (0..samples).map(move |s| id::primary_id(seed, pixel, s)));
         let balance = Balance::debit(ids);
-        for pixel in self.pixels(tile) {
-            self.sums[pixel as usize] = [0; 3];
-        }
+        self.empty(tile);
         self.tiles[tile as usize] = TileState { balance, epoch, open: true, finished: false };
+    }
+
+    /// Sums of a tile's pixels, row by row. Those of a finished tile do not change any more. `tile` is one of the
+    /// picture's.
+    pub fn tile_sums(&self, tile: u32) -> impl Iterator<Item = [u64; 3]> + '_ {
+        self.pixels(tile).map(|pixel| self.sums[pixel as usize])
     }
 
     /// Sums of all pixels, row by row from the top. Pixels of tiles that are not finished are what has arrived.
@@ -237,6 +267,48 @@ mod tests {
             assert_eq!(step.fix(refused), Fixed::Refused);
         }
         assert_eq!(step.mean(3 << 32, 2), 1.5);
+    }
+
+    #[test]
+    fn a_tile_that_is_kept_is_finished_and_takes_no_more() {
+        // Two tiles, the second of two columns.
+        let frame = Frame {
+            width: 10,
+            height: 8,
+            samples: 1,
+            depth_max: 1,
+            filter: 0,
+            seed: 0,
+            weight_cutoff: 0.0,
+            step_log2: 0,
+            eye: [0.0; 3],
+            target: [0.0; 3],
+            up: [0.0; 3],
+            fov_y_degrees: 1.0,
+            hither: 0.0,
+        };
+        let (mut sums, mut tiles) = ([[0; 3]; 80], [TileState::default(); 2]);
+        let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();
+        let mut values = [0u8; 16 * 24];
+        values.iter_mut().zip(1..=16u8).for_each(|(byte, value)| *byte = value);
+        // Something has arrived of it: that is not added to.
+        assert_eq!(film.add(1, 0, (2, 8), 1, &values), Ok(false));
+        for (tile, bytes) in [(0, &values[..]), (1, &values[1..]), (2, &values), (u32::MAX, &values), (1, &[])] {
+            assert_eq!(film.keep(tile, bytes), Err(FilmError::Tile(tile)));
+        }
+        assert_eq!(film.finished(), 0);
+        for values in [&values, &[9; 16 * 24]] {
+            assert_eq!(film.keep(1, values), Ok(()));
+        }
+        film.open(1, 3);
+        assert_eq!(film.add(1, 4, (2, 8), 1, &values), Ok(false));
+        assert!(film.tile_is_finished(1) && film.finished() == 1 && !film.is_finished());
+        assert_eq!(
+            film.tile_sums(1).flatten().take(3).collect::<heapless::Vec<_, 3>>(),
+            [0x0807_0605_0403_0201, 0x100f_0e0d_0c0b_0a09, 0]
+        );
+        assert_eq!(film.sums()[8], [0x0807_0605_0403_0201, 0x100f_0e0d_0c0b_0a09, 0]);
+        assert_eq!(film.sums()[18], [0; 3]);
     }
 
     #[test]

@@ -71,6 +71,8 @@ pub struct Master<'m> {
     dispatcher: Peer,
     /// Peers up to this one have been told to begin.
     begun: usize,
+    /// The dispatcher has heard which tiles up to this one are finished already.
+    kept: u32,
     /// Peers up to this one have been told to stop; and whether to.
     stopping: Option<usize>,
     outcome: Option<Outcome>,
@@ -92,6 +94,7 @@ impl<'m> Master<'m> {
             scene_hash,
             dispatcher,
             begun: 0,
+            kept: 0,
             stopping: None,
             outcome: None,
             looking: None,
@@ -105,6 +108,12 @@ impl<'m> Master<'m> {
     #[must_use]
     pub fn film(&self) -> &Film<'m> {
         &self.film
+    }
+
+    /// The film, to put in what is finished already, before the first [`Master::poll`].
+    #[must_use]
+    pub fn film_mut(&mut self) -> &mut Film<'m> {
+        &mut self.film
     }
 
     /// What each peer reported; the host's is empty.
@@ -223,13 +232,32 @@ impl<'m> Master<'m> {
         }
     }
 
-    /// Sends what has to be said. Bounded: one message a peer, and 16 tiles to be traced again.
+    /// Tells the dispatcher, run by run, which tiles are finished before the picture begins; false if there is no room
+    /// for more now. Bounded: the tiles of the picture, once.
+    fn tell_kept(&mut self, link: &mut dyn Link) -> bool {
+        let tiles = if self.film.finished() > 0 { self.film.map().len() } else { 0 };
+        while let Some(first) = (self.kept..tiles).find(|&tile| self.film.tile_is_finished(tile)) {
+            let count = (first..tiles).take_while(|&tile| self.film.tile_is_finished(tile)).count() as u32;
+            if !send(link, self.dispatcher, &Message::Kept { first, count }) {
+                return false;
+            }
+            self.kept = first + count;
+        }
+        true
+    }
+
+    /// Sends what has to be said. Bounded: one message a peer, one a run of tiles that are there already, and 16 tiles to
+    /// be traced again.
     pub fn poll(&mut self, link: &mut dyn Link) {
         while self.begun < self.nodes.len() {
             // The host comes last: a dispatcher there must not give out what nodes do not know.
             let peer = if self.begun + 1 < self.nodes.len() { self.begun + 1 } else { 0 };
-            if !self.nodes[peer].lost && !send(link, peer as Peer, &Message::Begin(self.frame)) {
-                break;
+            if !self.nodes[peer].lost {
+                // Who gives out tiles hears which of them are not wanted before it hears of the picture.
+                let ready = peer != usize::from(self.dispatcher) || self.tell_kept(link);
+                if !(ready && send(link, peer as Peer, &Message::Begin(self.frame))) {
+                    break;
+                }
             }
             self.begun += 1;
         }

@@ -190,6 +190,13 @@ pub enum Message {
         /// How many.
         count: u32,
     },
+    /// Host to dispatcher, before the picture begins: these tiles are finished already, do not give them out.
+    Kept {
+        /// First tile.
+        first: u32,
+        /// How many, 1 or more.
+        count: u32,
+    },
 }
 
 /// Bytes of the longest head.
@@ -341,6 +348,7 @@ mod tests {
         check(Message::Share { with: u16::MAX });
         check(Message::Idle { given: true });
         check(Message::Back { with: u16::MAX, first: u32::MAX, count: u32::MAX });
+        check(Message::Kept { first: u32::MAX, count: u32::MAX });
         check(Message::Fetch { page: u32::MAX });
         check(Message::Part { page: u32::MAX, offset: u32::MAX, bytes: 4096 });
         check(Message::Rays { rays: 186, shadows: 0, load: 0 });
@@ -368,6 +376,7 @@ mod tests {
         check(Message::Tiles { first: 1172, count: 300, epoch: 0 }, &[2, 0x94, 9, 0xac, 2, 0]);
         check(Message::Rays { rays: 100, shadows: 3, load: 300 }, &[9, 100, 3, 0xac, 2]);
         check(Message::Took { taken: true, load: 0 }, &[10, 1, 0]);
+        check(Message::Kept { first: 1172, count: 300 }, &[16, 0x94, 9, 0xac, 2]);
         check(Message::Partials { count: 409 }, &[11, 0x99, 3]);
         check(Message::Fetch { page: 1172 }, &[12, 0x94, 9]);
         check(Message::Part { page: 1172, offset: 4096, bytes: 4096 }, &[13, 0x94, 9, 0x80, 0x20, 0x80, 0x20]);

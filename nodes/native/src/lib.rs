@@ -5,6 +5,7 @@ use hybray_arena::{Arena, LINE_BYTES};
 use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Peer};
 use hybray_memory::{MemoryLink, links};
+pub use hybray_runner::Watch;
 use hybray_runner::{run_master, run_node};
 use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
@@ -79,18 +80,11 @@ pub struct Traced {
     pub refused_frames: u64,
 }
 
-/// Traces `frame` on `farm.nodes` threads that all have `scene`. `watch` is called often, on this thread; the picture ends
-/// as it is when it returns false. `None` if nodes cannot draw it ([`can_draw`]).
+/// Traces `frame` on `farm.nodes` threads that all have `scene`. `watch` is called on this thread. `None` if nodes cannot draw it ([`can_draw`]).
 ///
 /// # Panics
 /// If a node's thread panics: that is a bug.
-pub fn trace(
-    scene: &Scene<'_>,
-    scene_hash: u64,
-    frame: &Frame,
-    farm: &Farm,
-    watch: &mut dyn FnMut(Progress) -> bool,
-) -> Option<Traced> {
+pub fn trace(scene: &Scene<'_>, scene_hash: u64, frame: &Frame, farm: &Farm, watch: &mut dyn Watch) -> Option<Traced> {
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes();
     run(frame, scene_hash, farm, &[], watch, &|peer, link, dispatcher, clock| {
@@ -116,7 +110,7 @@ pub fn trace_within(
     frame: &Frame,
     farm: &Farm,
     budget: &Budget<'_>,
-    watch: &mut dyn FnMut(Progress) -> bool,
+    watch: &mut dyn Watch,
 ) -> Result<Option<Traced>, PlanError> {
     let mut entries = scene.resident.directory.entries.to_vec();
     for (entry, &owner) in entries.iter_mut().zip(budget.owners) {
@@ -198,7 +192,7 @@ fn run(
     scene_hash: u64,
     farm: &Farm,
     pages: &[&[u8]],
-    watch: &mut dyn FnMut(Progress) -> bool,
+    watch: &mut dyn Watch,
     node: &Turn<'_>,
 ) -> Option<Traced> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
@@ -206,6 +200,8 @@ fn run(
     let peers = usize::from(nodes) + 1;
     // Where nodes must ask for pages, each does best to draw on the same ones for long.
     let biased = !pages.is_empty();
+    // A bit for each tile, where tiles are given out.
+    let kept_words = map.len().div_ceil(64) as usize;
     let dispatcher_at = dispatcher_at(farm);
     let worked = Mutex::new(vec![Worked::default(); usize::from(nodes)]);
 
@@ -225,13 +221,16 @@ fn run(
             threads.spawn(move || {
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
-                let dispatcher = here.then(|| Dispatcher::new(&mut states, farm.options).on(peer).biased(biased));
+                let mut kept = vec![0; if here { kept_words } else { 0 }];
+                let dispatcher =
+                    here.then(|| Dispatcher::new(&mut states, farm.options).on(peer).biased(biased).keeping(&mut kept));
                 let did = node(peer, &mut link, dispatcher, clock);
                 worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });
         }
-        let mut states = vec![NodeState::default(); peers];
-        let dispatcher = (dispatcher_at == HOST).then(|| Dispatcher::new(&mut states, farm.options).biased(biased));
+        let (mut states, mut kept) = (vec![NodeState::default(); peers], vec![0; kept_words]);
+        let dispatcher = (dispatcher_at == HOST)
+            .then(|| Dispatcher::new(&mut states, farm.options).biased(biased).keeping(&mut kept));
         let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
         let server = PageServer::new(&mut asked, &mut turns);
         let outcome = run_master(&mut master, dispatcher, server, pages, &mut host_link, &mut { clock }, watch);

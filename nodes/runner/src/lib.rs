@@ -6,7 +6,7 @@
 #![forbid(unsafe_code)]
 
 use hybray_link::{Event, Link};
-use hybray_scheduler::{Dispatcher, Master, Node, Outcome, PageServer, Progress, Store};
+use hybray_scheduler::{Dispatcher, Film, Master, Node, Outcome, PageServer, Progress, Store};
 use hybray_wire::{Message, View, decode};
 
 /// How long a participant that has nothing to do waits for something to arrive, nanoseconds.
@@ -79,9 +79,29 @@ pub fn run_node<P: Store>(
     }
 }
 
+/// Who looks on while a picture is drawn, beside the master. A closure that looks at the progress alone is one too.
+pub trait Watch {
+    /// Before anything is said to nodes: tiles that are finished already may be put into the film ([`Film::keep`]). The
+    /// picture ends as it is when it returns false.
+    fn begin(&mut self, _film: &mut Film<'_>) -> bool {
+        true
+    }
+
+    /// Called often: how far it is. The picture ends as it is when it returns false.
+    fn look(&mut self, progress: Progress, film: &Film<'_>) -> bool;
+
+    /// How it ended; nothing is added to the film any more.
+    fn end(&mut self, _outcome: Outcome, _film: &Film<'_>) {}
+}
+
+impl<F: FnMut(Progress) -> bool> Watch for F {
+    fn look(&mut self, progress: Progress, _: &Film<'_>) -> bool {
+        self(progress)
+    }
+}
+
 /// Runs the master, and a dispatcher beside it if it has one, until the picture has ended. `server` gives out the bytes of
-/// `pages` that nodes ask the host for. `watch` is called often with how far it is; when it returns false, the picture is
-/// ended as it is.
+/// `pages` that nodes ask the host for.
 pub fn run_master(
     master: &mut Master<'_>,
     mut dispatcher: Option<Dispatcher<'_>>,
@@ -89,8 +109,11 @@ pub fn run_master(
     pages: &[&[u8]],
     link: &mut dyn Link,
     clock: &mut dyn FnMut() -> u64,
-    watch: &mut dyn FnMut(Progress) -> bool,
+    watch: &mut dyn Watch,
 ) -> Outcome {
+    if !watch.begin(master.film_mut()) {
+        master.stop();
+    }
     loop {
         let now = clock();
         let mut busy = receive(link, |arrival| match arrival {
@@ -116,7 +139,7 @@ pub fn run_master(
         if let Some(page) = server.missing() {
             master.missing(page);
         }
-        if !watch(master.progress()) {
+        if !watch.look(master.progress(), master.film()) {
             master.stop();
         }
         master.poll(link);
@@ -124,6 +147,7 @@ pub fn run_master(
             dispatcher.poll(link, clock());
         }
         if let Some(outcome) = master.outcome() {
+            watch.end(outcome, master.film());
             return outcome;
         }
         if !busy {

@@ -99,6 +99,54 @@ fn done(d: &mut Dispatcher<'_>, node: Peer, nanoseconds: u64, now: u64) {
 }
 
 #[test]
+fn tiles_that_are_kept_are_not_given_out() {
+    let (mut states, mut bits, mut wire) = (states(1), [u64::MAX; 2], Wire::new());
+    let mut d = Dispatcher::new(&mut states, FIXED).keeping(&mut bits);
+    let keep = |first, count| Message::Kept { first, count };
+    // Nobody but the host knows, and what lies beyond the bits is not remembered.
+    d.handle(1, &keep(0, 100), 0);
+    [keep(0, 2), keep(10, 1), keep(60, 10), keep(126, u32::MAX), keep(u32::MAX, 1)].iter().for_each(|message| {
+        d.handle(HOST, message, 0);
+    });
+    d.handle(HOST, &begin(130), 0);
+    d.handle(HOST, &keep(30, 10), 0);
+    d.handle(1, &HELLO, 0);
+    assert_eq!(d.left(), 130 - 2 - 1 - 10 - 2);
+    // A run that there was no room for comes back, and is sent later.
+    let mut given = Vec::new();
+    let mut round = 0;
+    while !d.is_idle() {
+        round += 1;
+        assert!(round < 200, "it does not end");
+        wire.room = round % 2;
+        d.poll(&mut wire, 0);
+        for (_, first, count, _) in wire.take() {
+            given.extend(first..first + count);
+        }
+        if round % 5 == 0 {
+            done(&mut d, 1, 1, 1);
+        }
+    }
+    let missing = [2..10, 11..60, 70..126, 128..130].into_iter().flatten();
+    assert_eq!(given, missing.collect::<Vec<u32>>());
+}
+
+#[test]
+fn where_every_tile_is_kept_nodes_hear_the_end_at_once() {
+    let (mut states, mut bits, mut wire) = (states(2), [0; 1], Wire::new());
+    let mut d = Dispatcher::new(&mut states, FIXED).biased(true).keeping(&mut bits);
+    d.handle(HOST, &Message::Kept { first: 0, count: 9 }, 0);
+    d.handle(2, &HELLO, 0);
+    d.poll(&mut wire, 0);
+    assert!(wire.told.is_empty(), "there is no picture yet");
+    d.handle(HOST, &begin(9), 0);
+    d.poll(&mut wire, 0);
+    d.handle(1, &HELLO, 0);
+    d.poll(&mut wire, 0);
+    assert_eq!((wire.take(), wire.told), (vec![], vec![2, 1]));
+}
+
+#[test]
 fn each_node_gets_one_run_before_any_gets_two() {
     let (mut states, mut wire) = (states(3), Wire::new());
     let mut d = dispatcher(&mut states, 16, FIXED);

@@ -8,8 +8,8 @@ use hybray_wire::decode;
 use std::vec;
 use std::vec::Vec;
 
-/// Keeps what is sent.
-struct Wire(Vec<(Peer, Message)>);
+/// Keeps what is sent, and has room for so much.
+struct Wire(Vec<(Peer, Message)>, usize);
 
 impl Link for Wire {
     fn me(&self) -> Peer {
@@ -19,6 +19,9 @@ impl Link for Wire {
         4
     }
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
+        if self.0.len() == self.1 {
+            return false;
+        }
         let mut bytes = vec![0; bytes_max];
         let used = write(&mut bytes);
         self.0.push((to, decode(&bytes[..used]).unwrap().message));
@@ -57,7 +60,7 @@ fn report(master: &mut Master<'_>, from: Peer) {
 
 /// What the dispatcher, at node 1, is asked for again.
 fn asked(master: &mut Master<'_>) -> Vec<(u32, u16)> {
-    let mut wire = Wire(Vec::new());
+    let mut wire = Wire(Vec::new(), usize::MAX);
     master.poll(&mut wire);
     let again = |(to, message): &(Peer, Message)| match message {
         Message::Again { tile, epoch } => {
@@ -77,6 +80,33 @@ fn with_master(test: impl FnOnce(&mut Master<'_>)) {
     (1..4).for_each(|node| say(&mut master, node, Message::Hello { version: VERSION, scene: 9 }));
     assert!(asked(&mut master).is_empty());
     test(&mut master);
+}
+
+#[test]
+fn the_dispatcher_hears_what_is_there_before_it_hears_of_the_picture() {
+    // Tiles 1, 2 and 5 of seven.
+    let frame = Frame { width: 56, ..FRAME };
+    let expected: Vec<_> = [Message::Kept { first: 1, count: 2 }, Message::Kept { first: 5, count: 1 }].into();
+    for (dispatcher, room) in [HOST, 1].into_iter().flat_map(|peer| (1..8).map(move |room| (peer, room))) {
+        let (mut sums, mut tiles) = ([[0; 3]; 448], [TileState::default(); 7]);
+        let mut nodes = vec![NodeReport::default(); 3];
+        let film = Film::new(&frame, &mut sums, &mut tiles).unwrap();
+        let mut master = Master::new(frame, film, &mut nodes, 9, dispatcher);
+        for tile in [1, 2, 5] {
+            master.film_mut().keep(tile, &[1; 64 * 24]).unwrap();
+        }
+        let mut wire = Wire(Vec::new(), 0);
+        for _ in 0..8 {
+            wire.1 += room;
+            master.poll(&mut wire);
+        }
+        let begin = |peer| (peer, Message::Begin(frame));
+        let kept: Vec<_> = expected.iter().map(|&message| (dispatcher, message)).collect();
+        let mut all = vec![begin(1), begin(2), begin(HOST)];
+        let at = all.iter().position(|&(peer, _)| peer == dispatcher).unwrap();
+        all.splice(at..at, kept);
+        assert_eq!(wire.0, all, "the dispatcher is {dispatcher}, room for {room}");
+    }
 }
 
 const ALL: [(u32, u16); 3] = [(0, 1), (1, 1), (NO_MORE, 1)];

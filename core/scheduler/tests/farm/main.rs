@@ -7,6 +7,7 @@ mod common;
 mod faults;
 mod net;
 mod pictures;
+mod resumed;
 mod shares;
 #[path = "../../examples/toy/mod.rs"]
 mod toy;
@@ -72,6 +73,9 @@ fn any_plan(rng: &mut Rng, picture: &'static Picture) -> Plan<'static> {
         stop_after: None,
         injected: Vec::new(),
         stranger: None,
+        kept: Vec::new(),
+        biased: false,
+        forgetful: false,
     }
 }
 

@@ -45,6 +45,9 @@ fn farm_at(dispatcher: Peer, costs: &[u64], speeds: &[u64], options: Options, ma
             stop_after: None,
             injected: Vec::new(),
             stranger: None,
+            kept: Vec::new(),
+            biased: false,
+            forgetful: false,
         };
         let report = play(&plan, &mut |_, _, _| Lie::No).unwrap();
         assert_eq!(report.outcome, Outcome::Finished);

@@ -45,6 +45,12 @@ pub struct Plan<'a> {
     pub injected: Vec<(u32, Peer, Peer, Vec<u8>)>,
     /// A node that has another scene.
     pub stranger: Option<Peer>,
+    /// Tiles that are finished before it begins, and their sums as bytes.
+    pub kept: Vec<(u32, Vec<u8>)>,
+    /// Each node begins in its own part of the picture.
+    pub biased: bool,
+    /// The dispatcher has no memory for which tiles are finished before.
+    pub forgetful: bool,
 }
 
 /// What came of it.
@@ -298,12 +304,15 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let mut sums = vec![[0; 3]; (map.width() * map.height()) as usize];
     let mut tiles = vec![TileState::default(); map.len() as usize];
     let mut reports = vec![NodeReport::default(); peers];
-    let film = Film::new(&plan.frame, &mut sums, &mut tiles).ok_or("no film")?;
+    let mut film = Film::new(&plan.frame, &mut sums, &mut tiles).ok_or("no film")?;
+    plan.kept.iter().try_for_each(|(tile, values)| film.keep(*tile, values)).map_err(|e| e.to_string())?;
     let mut master = Master::new(plan.frame, film, &mut reports, SCENE_HASH, plan.dispatcher);
     let mut states = vec![NodeState::default(); peers];
+    let mut bits = vec![0; if plan.forgetful { 0 } else { map.len().div_ceil(64) as usize }];
+    let dispatcher = Dispatcher::new(&mut states, plan.options).biased(plan.biased).keeping(&mut bits);
     let (mut host_dispatcher, mut node_dispatcher) = match plan.dispatcher {
-        HOST => (Some(Dispatcher::new(&mut states, plan.options)), None),
-        _ => (None, Some(Dispatcher::new(&mut states, plan.options).on(plan.dispatcher))),
+        HOST => (Some(dispatcher), None),
+        _ => (None, Some(dispatcher.on(plan.dispatcher))),
     };
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1;
