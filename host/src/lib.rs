@@ -4,6 +4,7 @@
 pub mod build;
 pub mod builtin;
 pub mod export;
+pub mod film;
 pub mod framing;
 pub mod import;
 pub mod model;

@@ -1,6 +1,7 @@
 //! A scene ready to be traced: pages, tables, and what it requires.
 
 use crate::build::{self, BuildError, Packed, Pages};
+use crate::film::Subject;
 use crate::framing;
 use crate::model::{CameraSpec, Model, Objects, Settings};
 use crate::pack::{self, HybError, Packing};
@@ -89,12 +90,8 @@ impl Prepared {
             })
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
-        let mut hash = packed.hash();
-        for bytes in [bytemuck::cast_slice(&materials), bytemuck::cast_slice(&lights)] {
-            hash = build::hash_bytes(hash, bytes);
-        }
-        hash = build::hash_bytes(hash, bytemuck::cast_slice(&[model.ambient, model.background]));
-        Self {
+        let mut prepared = Self {
+            hash: 0,
             packed,
             materials,
             lights,
@@ -108,8 +105,24 @@ impl Prepared {
             extent,
             warnings: model.warnings,
             build_time,
-            hash,
-        }
+        };
+        prepared.hash = prepared.hash_tables(prepared.packed.hash());
+        prepared
+    }
+
+    /// Adds to a hash what nodes know of the scene besides pages.
+    fn hash_tables(&self, hash: u64) -> u64 {
+        let colours = [self.ambient, self.background];
+        let tables: [&[u8]; 3] =
+            [bytemuck::cast_slice(&self.materials), bytemuck::cast_slice(&self.lights), bytemuck::cast_slice(&colours)];
+        tables.into_iter().fold(hash, build::hash_bytes)
+    }
+
+    /// What a film of `frame` is of: the same for all trees, page sizes and voxels, as the picture is.
+    #[must_use]
+    pub fn subject(&self, pages: &Pages<'_>, frame: &Frame) -> Subject {
+        let primitives = build::hash_bytes(pages.hash_primitives(), &self.packed.scale_log2.to_le_bytes());
+        Subject { scene: self.hash_tables(primitives), frame: *frame }
     }
 
     /// What the scene requires of a node beyond primary rays, in words (DESIGN section 2, law 6).

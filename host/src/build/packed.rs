@@ -3,11 +3,13 @@
 use super::BuildError;
 use super::tree::VoxelTree;
 use crate::partition::{PlacedPage, Plan};
+use hybray_bintree::cut::FLAT;
 use hybray_bintree::top;
 use hybray_bintree::walk::Resident;
 use hybray_geometry::Aabb;
-use hybray_scene::{Directory, Line, Node, PageEntry, PageView, Tables, lines_for};
+use hybray_scene::{BLOCK, Directory, Kind, Line, Node, PageEntry, PageView, Slot, Tables, lines_for};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The directory and what else is known of each page, without the pages.
 pub(crate) struct Index {
@@ -186,6 +188,48 @@ impl<'a> Pages<'a> {
     #[must_use]
     pub fn resident(&'a self) -> Resident<'a> {
         Resident { directory: self.packed.directory(), pages: &self.views }
+    }
+
+    /// Hash of the primitives, each counted once: equal for equal ones, however they are cut into pages.
+    #[must_use]
+    pub fn hash_primitives(&self) -> u64 {
+        // Ids count from 0, so this is room for all. What a broken file has beyond is counted where it stands.
+        let places: u64 = self.packed.index.primitives.iter().map(|&n| u64::from(n)).sum();
+        let seen: Vec<AtomicU64> = (0..places.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+        let is_new = |id: u32| {
+            let bit = 1 << (id % 64);
+            seen.get(id as usize / 64).is_none_or(|word| word.fetch_or(bit, Ordering::Relaxed) & bit == 0)
+        };
+        let of_page = |page: &PageView<'_>| {
+            let mut sum = 0u64;
+            let mut add = |kind: Kind, number: usize, id: u32, shape: &[f32], normals: &[u32]| {
+                if is_new(id) {
+                    let about = [id, kind as u32, page.material(Slot::new(kind, number)).into()];
+                    let parts: [&[u8]; 3] =
+                        [bytemuck::cast_slice(&about), bytemuck::cast_slice(shape), bytemuck::cast_slice(normals)];
+                    // A sum: it is the same in any order.
+                    sum = sum.wrapping_add(parts.into_iter().fold(HASH_START, hash_bytes));
+                }
+            };
+            for number in 0..page.triangles.len() * BLOCK {
+                let (block, lane) = (&page.triangles[number / BLOCK], number % BLOCK);
+                let corners = block.get(lane).v.map(|v| v.to_array());
+                let normals = page.normals.get(number).unwrap_or(&[FLAT; 3]);
+                add(Kind::Triangle, number, block.id[lane], corners.as_flattened(), normals);
+            }
+            for number in 0..page.spheres.len() * BLOCK {
+                let (block, lane) = (&page.spheres[number / BLOCK], number % BLOCK);
+                let sphere = block.get(lane);
+                let [x, y, z] = sphere.centre.to_array();
+                add(Kind::Sphere, number, block.id[lane], &[x, y, z, sphere.radius], &[]);
+            }
+            for (number, cone) in page.cones.iter().enumerate() {
+                let ([a, b, c], [d, e, f]) = (cone.base, cone.apex);
+                add(Kind::Cone, number, cone.id, &[a, b, c, cone.base_radius, d, e, f, cone.apex_radius], &[]);
+            }
+            sum
+        };
+        self.views.par_iter().map(of_page).reduce(|| 0, u64::wrapping_add)
     }
 }
 

@@ -186,6 +186,14 @@ pub(super) struct RenderArgs {
     /// Bits of a PNG's channel
     #[arg(long, value_parser = ["8", "16"], default_value = "8")]
     pub bits: String,
+    /// Go on with a picture that ended early: tiles that are in its film, the picture's file with `.film` after its name,
+    /// are not traced again. The same scene and settings are to be given; the farm may be another
+    #[arg(long)]
+    pub resume: bool,
+    /// Keep finished tiles in the film every so many seconds, so that --resume goes on even where the program was killed; 0
+    /// keeps them only where the picture ends early
+    #[arg(long, value_name = "SECONDS", default_value_t = 30)]
+    pub save_every: u32,
     /// Write a report in JSON to this file, or to standard output (`-`)
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,

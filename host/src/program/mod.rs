@@ -7,6 +7,7 @@ mod args;
 mod budget;
 mod convert;
 mod info;
+mod keep;
 mod pack;
 mod plan;
 mod render;

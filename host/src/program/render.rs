@@ -2,11 +2,13 @@
 
 use super::args::{RenderArgs, Where};
 use super::budget::{Farm as BudgetFarm, size};
+use super::keep::{Keeper, State};
 use super::report::{
     Budget, Counts, Exchange, Memory, Node, PlanReport, Rays, Report, ReportFile, Seconds, peak_bytes,
 };
 use super::show::{Show, rays_per_second};
 use super::{End, camera, load, prepare};
+use crate::film::{FilmFileError, Kept, Subject, path_for};
 use crate::model::Settings;
 use crate::pack::is_packed;
 use crate::partition::{Fit, page_bytes_for};
@@ -20,6 +22,7 @@ use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{NodeReport, Options, Outcome, Settings as NodeSettings, Sizes};
 use hybray_shading::Camera;
 use hybray_wire::Frame;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,6 +38,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let json = args.json.as_deref().map(ReportFile::create).transpose()?;
     if path == Path::new("-") && args.json.as_deref() == Some(Path::new("-")) {
         bail!("the picture and the report cannot both go to standard output: give one of them a file");
+    }
+
+    let film = path_for(&path);
+    if args.resume && film.is_none() {
+        bail!("--resume goes on with what lies beside a picture's file, and this goes to no file: name one with -o");
     }
 
     let mut show = Show::new(args.quiet);
@@ -95,10 +103,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
         show.line(&budget_line(fit, nodes, memory, policy));
     }
-    show.begin();
-    let mut watch = |progress| {
-        show.progress(progress);
-        !interrupted.load(Ordering::Relaxed)
+    let subject = || prepared.subject(&pages, &frame);
+    let kept = kept(args, film.as_deref(), &subject, &show)?;
+    let mut watch = Keeper {
+        show: &mut show,
+        interrupted: &interrupted,
+        path: film.as_deref(),
+        subject: &subject,
+        every: Duration::from_secs(args.save_every.into()),
+        kept,
+        state: State::default(),
     };
     let traced = match args.memory.zip(fit.as_ref()) {
         None => trace(&scene, prepared.hash, &frame, &farm, &mut watch),
@@ -110,7 +124,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     };
     let mut traced = traced.context("the picture has no pixels, or too many: give --size, such as 640x480")?;
     let trace_time = traced.time;
-    show.end();
+    let State { there, broken, trouble, in_file, .. } = watch.state;
+    if let Some(broken) = broken {
+        return Err(broken.into());
+    }
+    let film = film.filter(|_| in_file.is_some());
+    if let (Some(trouble), Some(path)) = (&trouble, path_for(&path)) {
+        show.line(&format!("warning: the film could not be kept in {}: {trouble}", path.display()));
+    }
     let budget = args.memory.zip(fit.as_ref()).map(|(memory, fit)| {
         let settings = fit.plan.settings(settings);
         Budget {
@@ -126,12 +147,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     });
     drop(pages);
 
+    let kept = |film: &PathBuf| format!("; what is finished is kept in {}: --resume goes on", film.display());
+    let goes_on = film.as_ref().map(kept).unwrap_or_default();
     match traced.outcome {
         Outcome::Finished | Outcome::Stopped => {}
-        Outcome::Unbalanced { tile } => bail!("tile {tile} lost a ray twice: please report this, with the scene"),
-        Outcome::Stranger { peer } => bail!("node {peer} has another scene or version"),
-        Outcome::Missing { page } => bail!("page {page} was lost with the node that had it: render again"),
-        Outcome::Abandoned => bail!("every node was lost before the picture was finished"),
+        Outcome::Unbalanced { tile } => {
+            bail!("tile {tile} lost a ray twice: please report this, with the scene{goes_on}")
+        }
+        Outcome::Stranger { peer } => bail!("node {peer} has another scene or version{goes_on}"),
+        Outcome::Missing { page } => bail!("page {page} was lost with the node that had it: render again{goes_on}"),
+        Outcome::Abandoned => bail!("every node was lost before the picture was finished{goes_on}"),
     }
     let film_warnings: Vec<_> = film_warnings(&traced).collect();
     prepared.warnings.extend_from_slice(&film_warnings);
@@ -139,7 +164,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     output.write(&picture(&frame, std::mem::take(&mut traced.radiance)), exposure)?;
     let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
     if let Some(json) = json {
-        let report = report(args, &prepared, &frame, &farm, &traced, seconds);
+        let report = report(args, &prepared, &frame, &farm, (&traced, there), seconds);
         json.write(&Report { budget, nodes: nodes_of(&traced, fit.as_ref()), ..report })?;
     }
     film_warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
@@ -159,11 +184,47 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     }
     if traced.outcome == Outcome::Stopped {
         let done = traced.progress;
-        show.line(&format!("interrupted: {} of {} tiles are in {}", done.finished, done.tiles, path.display()));
+        let (finished, tiles, path) = (done.finished, done.tiles, path.display());
+        show.line(&format!("interrupted: {finished} of {tiles} tiles are in {path}{goes_on}"));
         return Ok(End::Interrupted);
+    }
+    if let Some(film) = &film {
+        remove(film)?;
     }
     show.line(&format!("{}", path.display()));
     Ok(End::Done)
+}
+
+/// What there is of the picture, if it is to go on.
+fn kept(
+    args: &RenderArgs,
+    film: Option<&Path>,
+    subject: &dyn Fn() -> Subject,
+    show: &Show,
+) -> Result<Option<Kept>, FilmFileError> {
+    let Some(path) = film else { return Ok(None) };
+    let name = path.display();
+    if !args.resume {
+        if path.exists() {
+            show.line(&format!("{name} has tiles of a picture that ended early: --resume would go on with it"));
+        }
+        return Ok(None);
+    }
+    let kept = Kept::open(path, &subject())?;
+    match &kept {
+        Some(kept) => show.line(&format!("{name}: {} tiles are there", kept.tiles())),
+        None => show.line(&format!("there is no {name}: the picture begins from the start")),
+    }
+    Ok(kept)
+}
+
+/// Removes a film whose picture is written.
+fn remove(film: &Path) -> Result<()> {
+    match std::fs::remove_file(film) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error)
+            .with_context(|| format!("{}: the picture is done, but its film cannot be removed", film.display())),
+        _ => Ok(()),
+    }
 }
 
 /// What is about nodes with a budget wants one.
@@ -271,7 +332,7 @@ fn report(
     prepared: &Prepared,
     frame: &Frame,
     farm: &Farm,
-    traced: &Traced,
+    (traced, tiles_kept): (&Traced, u32),
     [import, build, trace, total]: [Duration; 4],
 ) -> Report {
     let mut counts = hybray_wire::Counts::default();
@@ -302,6 +363,7 @@ fn report(
             materials,
             pages: prepared.packed.pages() as u64,
             tiles: traced.progress.tiles,
+            tiles_kept,
             hits: counts.hits,
             contributions: counts.contributions,
             refused: counts.refused,

@@ -62,6 +62,8 @@ pub(super) struct Counts {
     pub materials: u64,
     pub pages: u64,
     pub tiles: u32,
+    /// Of them, those that were finished before.
+    pub tiles_kept: u32,
     pub hits: u64,
     pub contributions: u64,
     pub refused: u64,

@@ -10,6 +10,8 @@ pub(super) struct Show {
     form: Form,
     start: Instant,
     next: Duration,
+    /// Tiles that were there when the tracing began.
+    there: u32,
 }
 
 enum Form {
@@ -34,7 +36,7 @@ impl Show {
         } else {
             Form::Lines
         };
-        Self { form, start: Instant::now(), next: Duration::ZERO }
+        Self { form, start: Instant::now(), next: Duration::ZERO, there: 0 }
     }
 
     /// Says something that stays.
@@ -46,9 +48,14 @@ impl Show {
         }
     }
 
-    /// The clock of the tracing starts now.
-    pub fn begin(&mut self) {
-        self.start = Instant::now();
+    /// The clock of the tracing starts now; `there` of `tiles` are finished already.
+    pub fn begin(&mut self, there: u32, tiles: u32) {
+        (self.start, self.there) = (Instant::now(), there);
+        if let Form::Bar(bar) = &self.form {
+            bar.set_length(u64::from(tiles));
+            bar.set_position(u64::from(there));
+            bar.reset_eta();
+        }
         self.next = if matches!(self.form, Form::Lines) { LINES } else { BAR };
     }
 
@@ -69,7 +76,9 @@ impl Show {
             }
             Form::Lines => {
                 let done = f64::from(progress.finished) / f64::from(progress.tiles.max(1));
-                let left = if done > 0.0 { elapsed.as_secs_f64() * (1.0 - done) / done } else { f64::INFINITY };
+                let new = f64::from(progress.finished - self.there.min(progress.finished));
+                let missing = f64::from(progress.tiles - progress.finished);
+                let left = if new > 0.0 { elapsed.as_secs_f64() * missing / new } else { f64::INFINITY };
                 eprintln!("{:3.0} %, {rate}, {left:.0} s left", 100.0 * done);
                 self.next = elapsed + LINES;
             }

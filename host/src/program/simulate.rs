@@ -68,7 +68,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
         experiment.settings = args.work.settings(args.machine.settings(policy));
         let s = if nodes == 1 { "" } else { "s" };
         show.line(&format!("{}, {} with {nodes} node{s}", args.machine.name, name_of(policy)));
-        show.begin();
+        show.begin(0, 0);
         let run = experiment.run(nodes, &mut |progress| {
             show.progress(progress);
             !interrupted.load(Ordering::Relaxed)
