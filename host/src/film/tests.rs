@@ -1,7 +1,11 @@
 use super::header::FileHeader;
 use super::*;
-use crate::build::hash_bytes;
+use crate::build::{Rule, Settings, hash_bytes};
+use crate::model::Model;
 use crate::picture::pending::tests::Scratch;
+use crate::prepare::Prepared;
+use crate::{framing, import};
+use hybray_bintree::midpoint;
 use hybray_scheduler::{Film, TileState};
 use hybray_wire::{Frame, TileMap};
 use proptest::prelude::*;
@@ -257,6 +261,54 @@ fn a_film_lies_beside_its_picture() {
     assert_eq!(path_for(Path::new("-")), None);
     #[cfg(unix)]
     assert_eq!(path_for(Path::new("/dev/null")), None);
+}
+
+/// The scene of a film is the same for every tree, and another for every change of what is drawn.
+#[test]
+fn a_scene_is_known_by_what_it_holds() {
+    let model = |name: &str| {
+        let mut model = import::load(name).unwrap();
+        framing::complete_with_up(&mut model, import::up_axis(name));
+        model
+    };
+    let hash = |model: Model, settings: &Settings| {
+        let prepared = Prepared::new(model, settings).unwrap();
+        prepared.subject(&prepared.packed.open().unwrap(), &FRAME).scene
+    };
+    let midpoint = Rule::Midpoint(midpoint::Settings { depth_max: 9, objects_max: 4 });
+    let mut seen = Vec::new();
+    for name in ["terrain:2000", "spd:teapot:3", "spd:tree:4", "cornell:mirror"] {
+        let usual = hash(model(name), &Settings::default());
+        for (rule, voxels) in [(Rule::SurfaceArea, "1"), (Rule::SurfaceArea, "5"), (midpoint, "2x3x1")] {
+            let settings = Settings { rule, page_bytes: 4096, voxels: voxels.parse().unwrap() };
+            assert_eq!(hash(model(name), &settings), usual, "{name}, {settings:?}");
+        }
+        let changes: [fn(&mut Model); 9] = [
+            |m| m.meshes[0].positions[2][1] += 0.01,
+            |m| m.meshes[0].triangles[0].rotate_left(1),
+            |m| m.meshes[0].triangles.truncate(1),
+            |m| m.meshes.iter_mut().filter(|mesh| !mesh.normals.is_empty()).for_each(|mesh| mesh.normals[0] = [0.0; 3]),
+            |m| m.spheres.iter_mut().take(1).for_each(|s| s.radius *= 1.01),
+            |m| m.cones.iter_mut().take(1).for_each(|c| c.apex_radius *= 1.01),
+            |m| m.materials.reverse(),
+            |m| m.lights[0].position[0] += 0.5,
+            |m| m.background[2] += 0.5,
+        ];
+        seen.push(usual);
+        for (number, change) in changes.iter().enumerate() {
+            let (mut changed, before) = (model(name), model(name));
+            change(&mut changed);
+            let differs = format!("{changed:?}") != format!("{before:?}");
+            let hash = hash(changed, &Settings::default());
+            if differs {
+                assert!(!seen.contains(&hash), "{name}, change {number}");
+                seen.push(hash);
+            } else {
+                assert_eq!(hash, usual, "{name}, change {number} changes nothing");
+            }
+        }
+    }
+    assert!(seen.len() > 4 + 4 * 6, "of {} changes most should change something", 4 * 9);
 }
 
 /// A film whose hash is right, whatever it says.

@@ -7,6 +7,7 @@ mod errors;
 mod pack;
 mod pictures;
 mod report;
+mod resume;
 mod simulate;
 mod talk;
 mod trace;
