@@ -13,11 +13,11 @@ fn interrupt(child: &Child) {
     assert!(sent.success());
 }
 
-/// A picture of hours.
-const LONG: &str = "render spd:balls:2 --size 1024x1024 --spp 4000 --nodes 2 -o a.ppm";
+/// A picture of many minutes, a tile of milliseconds.
+const LONG: &str = "render spd:balls:2 --size 1024x1024 --spp 500 --nodes 2 -o a.ppm";
 
 fn tiles_in_film(folder: &Folder) -> u32 {
-    let wanted = Settings { size: Some([1024; 2]), spp: Some(4000), ..Settings::default() };
+    let wanted = Settings { size: Some([1024; 2]), spp: Some(500), ..Settings::default() };
     tiles_in(&folder.0.join("a.ppm.film"), "spd:balls:2", &wanted)
 }
 
