@@ -118,3 +118,63 @@ impl Watch for Keeper<'_> {
         self.show.end();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::pending::tests::Scratch;
+    use hybray_scheduler::TileState;
+    use hybray_wire::Frame;
+
+    /// A picture of two tiles, of which one is finished.
+    fn ended(outcome: Outcome, every: Duration, folder: &Scratch, path: &str) -> State {
+        let frame = Frame {
+            width: 16,
+            height: 8,
+            samples: 1,
+            depth_max: 1,
+            filter: 0,
+            seed: 0,
+            weight_cutoff: 0.0,
+            step_log2: 0,
+            eye: [0.0; 3],
+            target: [0.0; 3],
+            up: [0.0; 3],
+            fov_y_degrees: 1.0,
+            hither: 0.0,
+        };
+        let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
+        let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();
+        let mut keeper = Keeper {
+            show: &mut Show::new(true),
+            interrupted: &AtomicBool::new(false),
+            path: Some(&folder.0.join(path)),
+            subject: &|| Subject { scene: 1, frame },
+            every,
+            kept: None,
+            state: State::default(),
+        };
+        assert!(keeper.begin(&mut film));
+        film.keep(1, &[1; 64 * 24]).unwrap();
+        assert!(keeper.look(Progress::default(), &film));
+        keeper.end(outcome, &film);
+        keeper.state
+    }
+
+    #[test]
+    fn what_ends_early_is_kept_however_it_ends() {
+        let folder = Scratch::new("keep");
+        let hour = Duration::from_secs(3600);
+        for outcome in [Outcome::Stopped, Outcome::Abandoned, Outcome::Missing { page: 1 }] {
+            let state = ended(outcome, hour, &folder, "film");
+            assert_eq!((state.in_file, folder.names()), (Some(1), vec!["film".to_owned()]), "{outcome:?}");
+            std::fs::remove_file(folder.0.join("film")).unwrap();
+        }
+        assert_eq!(ended(Outcome::Stopped, Duration::ZERO, &folder, "film").in_file, Some(1));
+        std::fs::remove_file(folder.0.join("film")).unwrap();
+        assert_eq!(ended(Outcome::Finished, hour, &folder, "film").in_file, None);
+        let state = ended(Outcome::Abandoned, hour, &folder, "missing/film");
+        assert!(state.in_file.is_none() && state.trouble.is_some());
+        assert!(folder.names().is_empty());
+    }
+}

@@ -52,8 +52,10 @@ impl Show {
     pub fn begin(&mut self, there: u32, tiles: u32) {
         (self.start, self.there) = (Instant::now(), there);
         if let Form::Bar(bar) = &self.form {
-            bar.set_length(u64::from(tiles));
-            bar.set_position(u64::from(there));
+            bar.update(|state| {
+                state.set_len(u64::from(tiles));
+                state.set_pos(u64::from(there));
+            });
             bar.reset_eta();
         }
         self.next = if matches!(self.form, Form::Lines) { LINES } else { BAR };
