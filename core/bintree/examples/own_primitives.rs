@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // 4. Whoever receives a page validates it, once, and reads it where it is.
     let tables = Tables { materials: 2 };
     let views = pages.iter().map(|lines| PageView::parse(lines, tables)).collect::<Result<Vec<_>, _>>()?;
-    let directory = Directory::parse(&nodes[..used], &entries, &mut vec![0; used])?;
+    let directory = Directory::parse(&nodes[..used], &entries, &mut vec![0; used + entries.len()])?;
     let scene = Resident { directory, pages: &views[..] };
 
     // 5. A ray.

@@ -233,7 +233,7 @@ fn walks_through_mutated_directories_end() {
     let built = build(&shapes, rules()[0], 2048).unwrap();
     let (views, seen) = (built.views(), RefCell::new(Vec::new()));
     let rays = rays(&shapes, 16, 1);
-    let (mut level, mut stack, mut accepted) = (vec![0; built.nodes.len()], Stack::new(), 0);
+    let (mut level, mut stack, mut accepted) = (vec![0; built.nodes.len() + views.len()], Stack::new(), 0);
     for round in 0..4000 {
         let mut nodes = built.nodes.clone();
         for _ in 0..1 + random.below(4) {

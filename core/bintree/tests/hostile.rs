@@ -108,7 +108,7 @@ fn mutated_directories_are_refused_or_walked() {
     let built = build(&shapes, Rule::Sah(sah::Settings::default()), 2048).unwrap();
     assert!(built.nodes.len() > 5, "{}", built.nodes.len());
     let views = built.views();
-    let mut level = vec![0; built.nodes.len()];
+    let mut level = vec![0; built.nodes.len() + built.entries.len()];
     let mut accepted = 0;
     for round in 0..20_000 {
         let (mut nodes, mut entries) = (built.nodes.clone(), built.entries.clone());

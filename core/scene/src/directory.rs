@@ -38,6 +38,14 @@ pub enum DirectoryError {
         /// What is wrong with it.
         what: &'static str,
     },
+    /// A page that not exactly one node leads to.
+    #[error("page {page} of the directory: {what}")]
+    Page {
+        /// Its number.
+        page: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// A page of an impossible size.
     #[error("page {page} of the directory has {bytes} bytes; a page has 1 to 65536")]
     Size {
@@ -88,20 +96,40 @@ pub fn parents(nodes: &[Node], out: &mut [u32]) {
 }
 
 impl<'a> Directory<'a> {
-    /// Validates a directory: whatever the bytes, a walk of it ends and names only its pages. `level` is scratch, one
-    /// byte a node.
+    /// Validates a directory: whatever the bytes, a walk of it ends, names only its pages, and finds its way back from a
+    /// page by the one place that leads there. `scratch` is one byte for each node and page.
     ///
     /// # Errors
     /// See [`DirectoryError`].
-    pub fn parse(nodes: &'a [Node], entries: &'a [PageEntry], level: &mut [u8]) -> Result<Self, DirectoryError> {
+    pub fn parse(nodes: &'a [Node], entries: &'a [PageEntry], scratch: &mut [u8]) -> Result<Self, DirectoryError> {
+        let bytes = scratch.len();
+        let Some((level, led_to)) = scratch
+            .split_at_mut_checked(nodes.len())
+            .and_then(|(level, rest)| Some((level, rest.get_mut(..entries.len())?)))
+        else {
+            return Err(DirectoryError::Node { node: bytes, what: "more nodes and pages than there is scratch for" });
+        };
+        led_to.fill(0);
+        let mut twice = None;
         check_nodes(nodes, level, |child| match child {
-            Child::Page(page) if (page as usize) < entries.len() => Ok(()),
-            Child::Page(_) => Err("a page that is not in the directory"),
+            Child::Page(page) => {
+                let times = led_to.get_mut(page as usize).ok_or("a page that is not in the directory")?;
+                if core::mem::replace(times, 1) != 0 {
+                    twice = twice.or(Some(page as usize));
+                }
+                Ok(())
+            }
             _ => Err("primitives outside a page"),
         })
         .map_err(|(node, what)| DirectoryError::Node { node, what })?;
-        match entries.iter().position(|e| e.bytes == 0 || e.bytes as usize > PAGE_BYTES_MAX) {
-            Some(page) => Err(DirectoryError::Size { page, bytes: entries[page].bytes }),
+        if let Some(page) = entries.iter().position(|e| e.bytes == 0 || e.bytes as usize > PAGE_BYTES_MAX) {
+            return Err(DirectoryError::Size { page, bytes: entries[page].bytes });
+        }
+        if let Some(page) = twice {
+            return Err(DirectoryError::Page { page, what: "it is led to more than once" });
+        }
+        match led_to.iter().position(|&times| times == 0) {
+            Some(page) => Err(DirectoryError::Page { page, what: "no node leads to it" }),
             None => Ok(Self { nodes, entries }),
         }
     }

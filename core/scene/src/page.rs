@@ -238,7 +238,7 @@ impl<'a> PageView<'a> {
 pub(crate) fn check_nodes(
     nodes: &[Node],
     level: &mut [u8],
-    leaf: impl Fn(Child) -> Result<(), &'static str>,
+    mut leaf: impl FnMut(Child) -> Result<(), &'static str>,
 ) -> Result<(), (usize, &'static str)> {
     let Some(level) = level.get_mut(..nodes.len()) else {
         return Err((level.len(), "more nodes than there is scratch for"));

@@ -8,8 +8,8 @@ use hybray_scene::{Child, Directory, DirectoryError, Kind, Node, PageEntry};
 const PAGE: PageEntry = PageEntry { bytes: 4096, owner: 3, kind: 0 };
 
 fn check(nodes: &[Node], entries: &[PageEntry], expected: Result<(), DirectoryError>) {
-    let mut level = vec![9; nodes.len()];
-    assert_eq!(Directory::parse(nodes, entries, &mut level).map(|_| ()), expected);
+    let mut scratch = vec![9; nodes.len() + entries.len()];
+    assert_eq!(Directory::parse(nodes, entries, &mut scratch).map(|_| ()), expected);
 }
 
 fn node(node: usize, what: &'static str) -> Result<(), DirectoryError> {
@@ -21,9 +21,19 @@ fn directories() {
     check(&[], &[], Ok(()));
     check(&[branch(&[Child::Page(0)])], &[PAGE], Ok(()));
     check(&[branch(&[Child::Page(1), Child::Inner(1)]), branch(&[Child::Page(0)])], &[PAGE; 2], Ok(()));
-    // A page that no node leads to, or two do: a walk ends all the same. `check` of hybray-bintree finds these.
-    check(&[branch(&[Child::Page(0), Child::Page(0)])], &[PAGE; 2], Ok(()));
     check(&chain(40), &[], Ok(()));
+}
+
+#[test]
+fn one_node_leads_to_each_page() {
+    let page = |page, what| Err(DirectoryError::Page { page, what });
+    let (twice, never) = ("it is led to more than once", "no node leads to it");
+    check(&[branch(&[Child::Page(0), Child::Page(0)])], &[PAGE], page(0, twice));
+    let apart = [branch(&[Child::Page(1), Child::Inner(1), Child::Page(0)]), branch(&[Child::Page(1)])];
+    check(&apart, &[PAGE; 2], page(1, twice));
+    check(&apart, &[PAGE; 3], page(1, twice));
+    check(&[branch(&[Child::Page(0), Child::Page(2)])], &[PAGE; 3], page(1, never));
+    check(&[], &[PAGE], page(0, never));
 }
 
 #[test]
@@ -53,9 +63,10 @@ fn pages_of_impossible_size() {
 }
 
 #[test]
-fn scratch_is_one_byte_a_node() {
+fn scratch_is_one_byte_for_each_node_and_page() {
     let nodes = chain(5);
-    let expected = DirectoryError::Node { node: 4, what: "more nodes than there is scratch for" };
-    assert_eq!(Directory::parse(&nodes, &[], &mut [0; 4]).map(|_| ()), Err(expected));
+    let short = |node| Err(DirectoryError::Node { node, what: "more nodes and pages than there is scratch for" });
+    assert_eq!(Directory::parse(&nodes, &[], &mut [0; 4]).map(|_| ()), short(4));
+    assert_eq!(Directory::parse(&nodes, &[PAGE], &mut [0; 5]).map(|_| ()), short(5));
     assert!(Directory::parse(&nodes, &[], &mut [0; 60]).is_ok());
 }

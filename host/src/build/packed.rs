@@ -178,7 +178,7 @@ impl Packed {
             .map(|page| PageView::parse(self.page(page), tables))
             .collect::<Result<Vec<_>, _>>()?;
         let Index { nodes, entries, .. } = &self.index;
-        Directory::parse(nodes, entries, &mut vec![0; nodes.len()])?;
+        Directory::parse(nodes, entries, &mut vec![0; nodes.len() + entries.len()])?;
         Ok(Pages { packed: self, views })
     }
 }

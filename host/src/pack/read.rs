@@ -9,7 +9,7 @@ use crate::build::{Index, Packed, hash_bytes, hash_page, primitives_in};
 use crate::import;
 use crate::model::{Model, NamedMaterial};
 use bytemuck::Pod;
-use hybray_scene::{Child, Directory, Line, Node, PAGE_BYTES_MAX, PageEntry, PageView, Tables, lines_for};
+use hybray_scene::{Directory, Line, PAGE_BYTES_MAX, PageEntry, PageView, Tables, lines_for};
 use hybray_shading::{Light, Material};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -102,8 +102,8 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     let materials: Vec<Material> = sections.read(layout.materials, header.materials as usize)?;
     let lights: Vec<Light> = sections.read(layout.lights, header.lights as usize)?;
     let rest_bytes: Vec<u8> = sections.read(layout.rest, header.rest_bytes as usize)?;
-    Directory::parse(&nodes, &entries, &mut vec![0; nodes.len()]).map_err(|e| broken(e.to_string()))?;
-    each_page_once(&nodes, entries.len())?;
+    let scratch = &mut vec![0; nodes.len() + entries.len()];
+    Directory::parse(&nodes, &entries, scratch).map_err(|e| broken(e.to_string()))?;
 
     let mut index =
         Index { nodes, entries, voxels, voxel_count: header.voxels, primitives: Vec::new(), hash: Index::HASH_START };
@@ -140,22 +140,6 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     }
     let packed = Packed::new(index, chunks, header.scale_log2, model.materials.len());
     Ok(Packing { packed, model, primitives: header.primitives, smooth: header.smooth, extent })
-}
-
-/// Walks that go on from a page find their way back by its one place in the directory.
-fn each_page_once(nodes: &[Node], pages: usize) -> Result<(), Complaint> {
-    let mut seen = vec![false; pages];
-    for (_, child) in nodes.iter().flat_map(Node::children) {
-        if let Child::Page(page) = child
-            && std::mem::replace(&mut seen[page as usize], true)
-        {
-            return Err(broken(format!("its directory leads to page {page} more than once")));
-        }
-    }
-    match seen.iter().position(|&seen| !seen) {
-        Some(page) => Err(broken(format!("its directory does not lead to page {page}"))),
-        None => Ok(()),
-    }
 }
 
 /// Lines of a piece of the pages: 4 MiB, and up to a page more.

@@ -191,7 +191,8 @@ impl Built {
     }
 
     pub fn resident<'a>(&'a self, views: &'a [PageView<'a>]) -> Resident<'a> {
-        let directory = Directory::parse(&self.nodes, &self.entries, &mut vec![0; self.nodes.len()]);
+        let scratch = &mut vec![0; self.nodes.len() + self.entries.len()];
+        let directory = Directory::parse(&self.nodes, &self.entries, scratch);
         Resident { directory: directory.expect("a builder's directory"), pages: views }
     }
 }
