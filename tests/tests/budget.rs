@@ -82,7 +82,7 @@ fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
 
 fn needed(plan: Result<Plan, PlanError>) -> Option<u64> {
     match plan {
-        Err(PlanError::Memory { needed, .. } | PlanError::Pages { needed, .. }) => Some(needed),
+        Err(PlanError::Memory { needed } | PlanError::Pages { needed }) => Some(needed),
         Ok(_) => None,
     }
 }
@@ -121,7 +121,7 @@ fn many_lights() {
 #[test]
 fn a_refusal_says_what_would_do() {
     let random = &mut Random(11);
-    let (mut too_few, mut not_even_a_node, mut none) = (0, 0, 0);
+    let (mut too_few, mut not_even_a_node) = (0, 0);
     for round in 0..4000 {
         let (pages_log2, nodes_log2) = (1 + random.below(14), random.below(9));
         let pages = 1 + random.below(1 << pages_log2);
@@ -144,17 +144,11 @@ fn a_refusal_says_what_would_do() {
                 assert!(plan(nodes, needed - LINE).is_err(), "{what}: less than {needed} does too");
                 match error {
                     PlanError::Memory { .. } => not_even_a_node += 1,
-                    PlanError::Pages { nodes_needed: 0, .. } => none += 1,
-                    PlanError::Pages { nodes_needed: needed, .. } => {
-                        too_few += 1;
-                        assert!(needed > u64::from(nodes), "{what}: {needed}");
-                        assert!(plan(needed as u16, memory).is_ok(), "{what}: {needed} nodes should do");
-                        assert!(plan(needed as u16 - 1, memory).is_err(), "{what}: less than {needed} nodes do too");
-                    }
+                    PlanError::Pages { .. } => too_few += 1,
                 }
             }
         }
     }
-    let seen = [too_few, not_even_a_node, none];
+    let seen = [too_few, not_even_a_node];
     assert!(seen.iter().all(|&count| count > 50), "some of each kind: {seen:?}");
 }

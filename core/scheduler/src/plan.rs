@@ -45,36 +45,19 @@ impl Sizes {
     }
 }
 
-/// Why a budget does not do.
+/// Why a budget does not do, and how many bytes for each node would.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// What every node must have does not fit.
-    #[error("{memory} bytes are too few for a node of this scene on {nodes} nodes: give each {needed} bytes or more")]
+    #[error("too little memory for a node of this scene: give each {needed} bytes or more")]
     Memory {
-        /// The budget.
-        memory: u64,
-        /// Nodes.
-        nodes: u16,
         /// The least that would do.
         needed: u64,
     },
     /// All nodes together cannot hold the pages.
-    #[error(
-        "the scene has {pages} bytes of pages, and {nodes} nodes of {memory} bytes have room for {room}: take \
-         {nodes_needed} nodes, or give each {needed} bytes"
-    )]
+    #[error("too little memory for this scene's pages: give each node {needed} bytes or more")]
     Pages {
-        /// Bytes of all pages.
-        pages: u64,
-        /// What all nodes together can hold.
-        room: u64,
-        /// The budget.
-        memory: u64,
-        /// Nodes.
-        nodes: u16,
-        /// Nodes that would do with this budget; 0 if no number of them would.
-        nodes_needed: u64,
-        /// Budget that would do with so many nodes.
+        /// The least that would do.
         needed: u64,
     },
 }
@@ -89,19 +72,6 @@ const PARTIALS: (u64, u64, u64) = (64, 64, 4_096);
 /// Bytes of pages that a node owns at most where shares are even: one page more than the mean.
 fn even_share(sizes: &Sizes, nodes: u16) -> u64 {
     (sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64).min(sizes.pages_bytes)
-}
-
-/// The first number from `from` on for which `enough` asks no more than it; `None` if `enough` has none, or there is no end
-/// of it. `enough` must not fall as its argument grows.
-fn first_fixed(from: u64, enough: impl Fn(&u64) -> Option<u64>) -> Option<u64> {
-    let mut at = from;
-    for _ in 0..1000 {
-        match enough(&at)? {
-            more if more > at => at = more,
-            _ => return Some(at),
-        }
-    }
-    None
 }
 
 /// What a node is made of.
@@ -141,20 +111,15 @@ impl Plan {
         let room = memory.saturating_sub(least);
         if memory < least || room < owned {
             // The shares grow with the budget, but slower: the first that is enough is met from below.
-            let enough = |memory: &u64| Some(Self::least(sizes, nodes, *memory).least_bytes() + owned);
-            let needed = first_fixed(memory, enough).unwrap_or(u64::MAX);
-            if memory < least {
-                return Err(PlanError::Memory { memory, nodes, needed });
+            let mut needed = memory;
+            loop {
+                let enough = Self::least(sizes, nodes, needed).least_bytes() + owned;
+                if enough <= needed {
+                    break;
+                }
+                needed = enough;
             }
-            // Likewise what is known of peers grows with the nodes.
-            let enough = |nodes: &u64| {
-                let nodes = u16::try_from(*nodes).ok().filter(|&nodes| nodes < u16::MAX)?;
-                let room = memory.checked_sub(Self::least(sizes, nodes, memory).least_bytes())?;
-                Some(sizes.pages_bytes / (room.checked_sub(sizes.page_bytes_max as u64)? + 1) + 1)
-            };
-            let nodes_needed = first_fixed(u64::from(nodes), enough).unwrap_or(0);
-            let (pages, room) = (sizes.pages_bytes, room * u64::from(nodes));
-            return Err(PlanError::Pages { pages, room, memory, nodes, nodes_needed, needed });
+            return Err(if memory < least { PlanError::Memory { needed } } else { PlanError::Pages { needed } });
         }
         let keeps_others = matches!(policy, Policy::Hybrid | Policy::DemandDriven);
         plan.holds_all = keeps_others && room >= sizes.pages_bytes;
