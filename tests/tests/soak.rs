@@ -119,7 +119,7 @@ fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
     let mut owned = *scene;
     owned.resident.directory.entries = &entries;
     match plan(&owned, nodes, 0, policy) {
-        Err(PlanError::Memory { needed, .. } | PlanError::Pages { needed, .. }) => needed,
+        Err(PlanError::Memory { needed } | PlanError::Pages { needed }) => needed,
         Ok(plan) => panic!("nothing is enough: {plan:?}"),
     }
 }
@@ -224,7 +224,7 @@ impl Draw {
 }
 
 /// Draws and runs one seed.
-fn check(seed: u64, all: &[Drawn]) {
+fn check(seed: u64, all: &[Drawn], closeness: &Closeness) {
     let random = &mut Random(seed);
     let drawn = &all[random.below(all.len())];
     let (frame, film, counts) = drawn.frames[random.below(SIZES.len())];
@@ -239,7 +239,7 @@ fn check(seed: u64, all: &[Drawn]) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         within(600, what, || {
             let run = draw.run(drawn, &scene, &pages, &frame);
-            expect(&run, &draw, film, &counts);
+            expect(&run, &draw, film, &counts, closeness);
             if seed.is_multiple_of(TWICE) {
                 let again = draw.run(drawn, &scene, &pages, &frame);
                 assert_eq!((again.events, again.film), (run.events, run.film), "another time another history");
@@ -253,7 +253,41 @@ fn check(seed: u64, all: &[Drawn]) {
     }
 }
 
-fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts) {
+/// How near runs without faults came to their bounds, billionths.
+#[derive(Debug, Default)]
+struct Closeness {
+    gap: AtomicU64,
+    wait: AtomicU64,
+    round: AtomicU64,
+}
+
+impl Closeness {
+    /// Between two ends of rays, while nobody traces, and from asking to the answer no more time passes than the plan says
+    /// (docs/PROGRESS.md). A fault begins the argument anew, and what is held up by one is no shorter for it.
+    fn look(&self, run: &Simulated, draw: &Draw) {
+        let held_ns = draw.faults.iter().map(|fault| match *fault {
+            Fault::Cut { from_ns, until_ns, .. } => until_ns - from_ns,
+            Fault::Lose { notice_ns, .. } => notice_ns,
+        });
+        let (held_ns, faults) = (u128::from(held_ns.sum::<u64>()), draw.faults.len() as u128);
+        let (longest, bound) = (&run.longest, &run.bound);
+        let all = [
+            ("from one ray's end to the next", longest.gap_ns, bound.gap_ns, &self.gap),
+            ("in which nobody traced", longest.wait_ns, bound.wait_ns, &self.wait),
+            ("from asking to the answer", longest.round_ns, bound.round_ns, &self.round),
+        ];
+        for (what, longest_ns, bound_ns, closest) in all {
+            let allowed_ns = (faults + 1) * bound_ns + held_ns;
+            assert!(u128::from(longest_ns) <= allowed_ns, "{longest_ns} ns {what}, {allowed_ns} at most: {bound:?}");
+            if faults == 0 {
+                let near = u128::from(longest_ns) * 1_000_000_000 / allowed_ns;
+                closest.fetch_max(near as u64, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts, closeness: &Closeness) {
     let lost = draw.faults.iter().any(|fault| matches!(fault, Fault::Lose { .. }));
     assert_eq!(run.outcome, Outcome::Finished);
     assert_eq!(run.film, film, "another picture");
@@ -270,6 +304,7 @@ fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts) {
         assert!(high.page_bytes <= 64 * run.plan.lines as u64, "node {}: {high:?}", number + 1);
         assert_eq!(node.exchange.nonsense, 0, "node {}", number + 1);
     }
+    closeness.look(run, draw);
     if let Some((memory, _)) = draw.budget {
         assert!(run.plan.sum().total_bytes() <= memory, "over budget: {:?}", run.plan);
     }
@@ -277,6 +312,8 @@ fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts) {
         let mut counts = Counts::default();
         run.nodes.iter().for_each(|node| counts += node.report.counts);
         assert_eq!(counts, *expected, "other rays");
+        let ended: u64 = run.nodes.iter().map(|node| node.ended).sum();
+        assert_eq!(ended, counts.primary + counts.secondary + counts.shadow, "rays that ended");
         let sum = |of: fn(&Simulated, usize) -> u64| (0..run.nodes.len()).map(|node| of(run, node)).sum::<u64>();
         let forwarded = sum(|run, node| run.nodes[node].exchange.forwarded);
         // The word that the last ones were taken may be on its way when all is finished.
@@ -297,7 +334,7 @@ fn random_schedules() {
         None => (variable("HYBRAY_FIRST").unwrap_or(0), variable("HYBRAY_SEEDS").unwrap_or(SEEDS)),
     };
     let all = Drawn::all();
-    let next = AtomicU64::new(first);
+    let (next, closeness) = (AtomicU64::new(first), Closeness::default());
     std::thread::scope(|threads| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
             threads.spawn(|| {
@@ -306,9 +343,10 @@ fn random_schedules() {
                     if seed >= first.saturating_add(count) {
                         break;
                     }
-                    check(seed, &all);
+                    check(seed, &all, &closeness);
                 }
             });
         }
     });
+    eprintln!("{closeness:?} of what is allowed at most, in billionths");
 }

@@ -23,12 +23,12 @@ pub use film::{Film, FilmError, Fixed, Step, TileState};
 pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
 pub use node::{
-    All, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own,
+    All, BUNDLE, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own,
     REQUESTS_MAX, Settings, Store, Traffic, can_draw,
 };
 
 pub use plan::{Plan, PlanError, Sizes};
-pub use server::{Asked, PageServer};
+pub use server::{Asked, FETCHES, PART_BYTES, PageServer};
 
 use hybray_link::{Link, Peer};
 use hybray_wire::{HEAD_BYTES_MAX, Message, encode};

@@ -10,7 +10,7 @@ use hybray_wire::{HEAD_BYTES_MAX, Message, encode};
 /// Pages that a peer may have asked for and not been sent: what is beyond is not heard.
 pub const FETCHES: usize = 2;
 /// Bytes of a page in one frame.
-const PART_BYTES: usize = 4096;
+pub const PART_BYTES: usize = 4096;
 
 /// What one peer has asked for.
 #[derive(Clone, Copy, Debug)]

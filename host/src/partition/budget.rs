@@ -42,6 +42,8 @@ pub struct Wanted {
     pub nodes: u16,
     /// What each of them has.
     pub memory: u64,
+    /// What of it is for pages at most, bytes; what there is if it is not given.
+    pub page_memory: Option<u64>,
     /// How they work.
     pub policy: Policy,
 }
@@ -115,7 +117,11 @@ impl Wanted {
     }
 
     fn plan(&self, owned_max: Option<u64>) -> Result<Plan, PlanError> {
-        Plan::new(self.sizes, self.nodes, self.memory, owned_max, self.policy)
+        let plan = Plan::new(self.sizes, self.nodes, self.memory, owned_max, self.policy)?;
+        Ok(match self.page_memory {
+            Some(bytes) => plan.with_page_memory(bytes, self.nodes, owned_max),
+            None => plan,
+        })
     }
 }
 
@@ -141,7 +147,8 @@ mod tests {
                     materials: 0,
                     lights: 0,
                 };
-                let wanted = |bytes| Wanted { sizes: sizes(bytes), nodes, memory, policy: Policy::DemandDriven };
+                let policy = Policy::DemandDriven;
+                let wanted = |bytes| Wanted { sizes: sizes(bytes), nodes, memory, page_memory: None, policy };
                 let fits = |bytes: u32| {
                     wanted(bytes).plan(Some(0)).map_or(0, |plan| plan.lines as u64 * 64 / u64::from(bytes))
                 };
@@ -181,7 +188,8 @@ mod tests {
             let nodes = 1 + random.below(if seed % 2 == 0 { 24 } else { 2 }) as u16;
             let (_, policy) = Policy::ALL[random.below(4) as usize];
             let memory = 80_000 + random.below(400_000 + sizes.pages_bytes / u64::from(nodes));
-            let wanted = Wanted { sizes, nodes, memory, policy };
+            let page_memory = (random.below(3) == 0).then(|| random.below(sizes.pages_bytes + 1));
+            let wanted = Wanted { sizes, nodes, memory, page_memory, policy };
             let least = wanted.least_memory().unwrap_or_else(|| panic!("seed {seed}: a TiB does not do"));
             let check = |wanted: Wanted| {
                 let fit = wanted.fit(&pages, voxels).unwrap_or_else(|e| panic!("seed {seed}: {wanted:?}: {e}"));

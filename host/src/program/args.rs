@@ -238,14 +238,38 @@ pub(super) struct PlanArgs {
     /// Memory of each node, such as 32MiB
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory: u64,
+    /// What of it is for pages at most: bytes, or a part of what the scene's pages take, such as 1/16
+    #[arg(long, value_name = "BYTES|1/N", value_parser = page_memory)]
+    pub page_memory: Option<PageMemory>,
     /// Whether rays go to pages or pages to rays
     #[arg(long, value_name = "NAME", default_value = "hybrid", value_parser = scheduler())]
     pub scheduler: Policy,
+    /// The machine that nodes are simulated on: how long it is at most until a ray ends there
+    #[arg(long, value_name = "NAME", value_parser = machine())]
+    pub machine: Option<&'static Machine>,
     /// Write the plan in JSON to this file, or to standard output (`-`) instead of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     #[command(flatten)]
     pub tree: TreeArgs,
+}
+
+/// Memory for pages: so much, or a part of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PageMemory {
+    Bytes(u64),
+    /// What all pages take, over this.
+    Part(u64),
+}
+
+impl PageMemory {
+    /// Bytes, for a scene whose pages take so many.
+    pub fn bytes(self, pages_bytes: u64) -> u64 {
+        match self {
+            Self::Bytes(bytes) => bytes,
+            Self::Part(parts) => pages_bytes / parts,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -270,6 +294,10 @@ pub(super) struct SimulateArgs {
     /// node alone, each has the whole scene
     #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = BUDGET)]
     pub memory: Option<u64>,
+    /// What of it is for pages at most: bytes, or a part of what the scene's pages take, such as 1/16. A node that owns more
+    /// has what it owns, and the least of a cache
+    #[arg(long, value_name = "BYTES|1/N", value_parser = page_memory, requires = "memory", help_heading = BUDGET)]
+    pub page_memory: Option<PageMemory>,
     /// Whether rays go to pages or pages to rays; several are run one after the other
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', default_value = "hybrid", value_parser = scheduler(), help_heading = BUDGET)]
     pub scheduler: Vec<Policy>,
@@ -414,6 +442,18 @@ fn bytes(text: &str) -> Result<u64, String> {
     };
     let number = digits.parse::<u64>().ok().and_then(|n| n.checked_mul(factor)).filter(|&bytes| bytes > 0);
     number.ok_or_else(|| "give bytes, such as 32MiB, 512KiB or 1GiB".to_owned())
+}
+
+/// Memory for pages: as [`bytes`], or 1/16.
+fn page_memory(text: &str) -> Result<PageMemory, String> {
+    let wanted = || "give bytes, such as 512KiB, or a part of the scene, such as 1/16".to_owned();
+    match text.split_once('/') {
+        Some((one, parts)) => {
+            let parts = parts.parse().ok().filter(|&parts| one == "1" && parts > 0);
+            parts.map(PageMemory::Part).ok_or_else(wanted)
+        }
+        None => bytes(text).map(PageMemory::Bytes).map_err(|_| wanted()),
+    }
 }
 
 fn number(text: &str, what: &str, holds: impl Fn(f32) -> bool) -> Result<f32, String> {

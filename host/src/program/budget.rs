@@ -14,6 +14,8 @@ pub(super) struct Farm<'a> {
     pub nodes: u16,
     /// Of each node, bytes.
     pub memory: u64,
+    /// What of it is for pages at most, bytes.
+    pub page_memory: Option<u64>,
     pub policy: Policy,
     /// Nodes that the command can have.
     pub nodes_most: u16,
@@ -65,7 +67,8 @@ impl Farm<'_> {
     }
 
     fn wanted(&self, scene: &Scene<'_>) -> Wanted {
-        Wanted { sizes: Sizes::of(scene), nodes: self.nodes, memory: self.memory, policy: self.policy }
+        let Self { nodes, memory, page_memory, policy, .. } = *self;
+        Wanted { sizes: Sizes::of(scene), nodes, memory, page_memory, policy }
     }
 
     fn remedies(&self, wanted: &Wanted) -> String {

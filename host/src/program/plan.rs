@@ -4,12 +4,14 @@ use super::args::PlanArgs;
 use super::budget::{Farm, Least, size};
 use super::report::{PlanReport, ReportFile};
 use super::{End, prepare};
+use crate::model::Settings;
 use crate::pack::is_packed;
 use crate::partition::{Fit, page_bytes_for};
-use crate::simulate::runs::name_of;
+use crate::simulate::runs::{name_of, seconds};
 use anyhow::Result;
 use hybray_scheduler::Sizes;
-use hybray_simulated::NODES_MAX;
+use hybray_simulated::{Bound, NODES_MAX};
+use hybray_wire::TileMap;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -30,7 +32,71 @@ struct Report<'a> {
     plan: PlanReport,
     least_memory: Option<u64>,
     least_nodes: Option<u16>,
+    progress: Option<Progress>,
     warnings: &'a [String],
+}
+
+/// How long it is at most until a ray ends on a machine, for the scene's own picture: docs/PROGRESS.md.
+struct Bounds {
+    machine: &'static str,
+    bound: Bound,
+}
+
+/// The same, in seconds.
+#[derive(Debug, Serialize)]
+struct Progress {
+    machine: &'static str,
+    walk_seconds: f64,
+    turn_seconds: f64,
+    way_seconds: f64,
+    round_seconds: f64,
+    quiet_round_seconds: f64,
+    wait_seconds: f64,
+    rays: u128,
+    steps: u128,
+    tracing_seconds: f64,
+    gap_seconds: f64,
+}
+
+impl Bounds {
+    fn report(&self) -> Progress {
+        let b = &self.bound;
+        Progress {
+            machine: self.machine,
+            walk_seconds: seconds(b.walk_ns),
+            turn_seconds: seconds(b.turn_ns),
+            way_seconds: seconds(b.way_ns),
+            round_seconds: seconds(b.round_ns),
+            quiet_round_seconds: seconds(b.quiet_round_ns),
+            wait_seconds: seconds(b.wait_ns),
+            rays: b.rays,
+            steps: b.steps,
+            tracing_seconds: seconds(b.tracing_ns),
+            gap_seconds: seconds(b.gap_ns),
+        }
+    }
+
+    fn table(&self) -> String {
+        let p = self.report();
+        let mut text = format!("\nat most, on {}\n", p.machine);
+        let rows = [
+            (p.walk_seconds, "a walk: every node and block of the scene"),
+            (p.turn_seconds, "a turn of a node: it takes in, traces and sends"),
+            (p.way_seconds, "a frame's way, until it is read"),
+            (p.round_seconds, "from asking for a page, or sending rays, to the answer"),
+            (p.quiet_round_seconds, "the same while nobody traces"),
+            (p.wait_seconds, "nobody traces"),
+            (p.tracing_seconds, "all that can be traced before a ray ends"),
+            (p.gap_seconds, "from the end of a ray to the next, anywhere"),
+        ];
+        for (seconds, what) in rows {
+            text += &format!("{seconds:>16.6} s  {what}\n");
+        }
+        text + &format!(
+            "{:>16}    rays under way, and {} steps that they can come on before one ends\n",
+            p.rays, p.steps
+        )
+    }
 }
 
 pub(super) fn run(args: &PlanArgs) -> Result<End> {
@@ -39,16 +105,24 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let (prepared, _) = prepare(&args.scene, &args.tree, None, page_bytes)?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
+    let sizes = Sizes::of(&scene);
     let farm = Farm {
         nodes: args.nodes,
         memory: args.memory,
+        page_memory: args.page_memory.map(|page_memory| page_memory.bytes(sizes.pages_bytes)),
         policy: args.scheduler,
         nodes_most: NODES_MAX,
         tree: &args.tree,
         packed: is_packed(&args.scene.scene),
     };
     let fit = farm.fit(&prepared, &scene)?;
-    let (sizes, least) = (Sizes::of(&scene), farm.least(&scene));
+    let least = farm.least(&scene);
+    let progress = args.machine.map(|machine| {
+        let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
+        let tiles = TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
+        let settings = fit.plan.settings(machine.settings(args.scheduler));
+        Bounds { machine: machine.name, bound: Bound::new(&scene, &fit.plan, &settings, machine, args.nodes, tiles, 0) }
+    });
     let report = Report {
         scene: &args.scene.scene,
         nodes: args.nodes,
@@ -61,11 +135,14 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
         plan: PlanReport::of(&fit),
         least_memory: least.memory,
         least_nodes: least.nodes,
+        progress: progress.as_ref().map(Bounds::report),
         warnings: &prepared.warnings,
     };
     if args.json.as_deref() != Some(Path::new("-")) {
         prepared.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-        std::io::stdout().lock().write_all(table(&report, &fit, &farm, least).as_bytes())?;
+        std::io::stdout().lock().write_all(
+            (table(&report, &fit, &farm, least) + &progress.map_or_else(String::new, |p| p.table())).as_bytes(),
+        )?;
     }
     if let Some(json) = json {
         json.write(&report)?;

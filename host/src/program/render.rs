@@ -99,7 +99,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
     let mut fit = None;
     if let Some(memory) = args.memory {
-        let farm = BudgetFarm { nodes, memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        let farm =
+            BudgetFarm { nodes, memory, page_memory: None, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
         show.line(&budget_line(fit, nodes, memory, policy));
     }

@@ -15,7 +15,7 @@ use crate::simulate::{csv, html};
 use anyhow::{Result, bail};
 use hybray_link::HOST;
 use hybray_scene::PAGE_BYTES_MAX;
-use hybray_scheduler::Options;
+use hybray_scheduler::{Options, Sizes};
 use hybray_simulated::NODES_MAX;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -45,11 +45,13 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     check_camera(&frame)?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
+    let pages_bytes = Sizes::of(&scene).pages_bytes;
+    let page_memory = args.page_memory.map(|page_memory| page_memory.bytes(pages_bytes));
     // One node alone has the whole scene.
     let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
     for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
         let packed = is_packed(&args.scene.scene);
-        let farm = Farm { nodes, memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        let farm = Farm { nodes, memory, page_memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
         if nodes > 1 {
             farm.fit(&prepared, &scene)?;
         }
@@ -63,7 +65,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     experiment.options = Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) };
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
-    experiment.memory = args.memory;
+    (experiment.memory, experiment.page_memory) = (args.memory, page_memory);
     for (policy, nodes) in farms {
         experiment.settings = args.work.settings(args.machine.settings(policy));
         let s = if nodes == 1 { "" } else { "s" };

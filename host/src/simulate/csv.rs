@@ -8,8 +8,8 @@ use super::record::{NodeRun, Report, Run};
 /// One line for each run.
 pub fn runs(report: &Report) -> String {
     let mut out = String::from(
-        "scene,machine,nodes,scheduler,seconds,speedup,efficiency,busy,loading_seconds,gathering_seconds,messages,bytes,\
-         memory_high_water,memory_limit,rays_primary,rays_secondary,rays_shadow,rays_forwarded,film,events\n",
+        "scene,machine,nodes,scheduler,seconds,speedup,efficiency,busy,loading_seconds,gathering_seconds,\
+         longest_gap,longest_gap_bound,longest_wait,longest_wait_bound,longest_round,longest_round_bound,messages,bytes,memory_high_water,memory_limit,rays_primary,rays_secondary,rays_shadow,rays_forwarded,film,events\n",
     );
     for run in &report.runs {
         let rays = &run.rays;
@@ -26,6 +26,12 @@ pub fn runs(report: &Report) -> String {
                 real(run.busy),
                 real(run.loading_seconds),
                 real(run.gathering_seconds),
+                real(run.longest_gap),
+                real(run.longest_gap_bound),
+                real(run.longest_wait),
+                real(run.longest_wait_bound),
+                real(run.longest_round),
+                real(run.longest_round_bound),
                 run.messages.to_string(),
                 run.bytes.to_string(),
                 run.memory_high_water.to_string(),
@@ -145,7 +151,7 @@ mod tests {
         made.runs[1].seconds = f64::NAN;
         made.runs[1].memory_limit = None;
         let rows = parse(&runs(&made));
-        assert!(rows.len() == 4 && rows.iter().all(|row| row.len() == 20));
+        assert!(rows.len() == 4 && rows.iter().all(|row| row.len() == 26));
         for (i, run) in made.runs.iter().enumerate() {
             assert_eq!(column(&rows, "scene")[i], HOSTILE);
             assert_eq!(column(&rows, "nodes")[i].parse(), Ok(run.nodes));
@@ -154,6 +160,12 @@ mod tests {
             assert_eq!(column(&rows, "bytes")[i].parse(), Ok(run.bytes));
             assert_eq!(column(&rows, "rays_forwarded")[i].parse(), Ok(run.rays.forwarded));
             assert_eq!(column(&rows, "gathering_seconds")[i].parse(), Ok(run.gathering_seconds));
+            assert_eq!(column(&rows, "longest_gap")[i].parse(), Ok(run.longest_gap));
+            assert_eq!(column(&rows, "longest_gap_bound")[i].parse(), Ok(run.longest_gap_bound));
+            assert_eq!(column(&rows, "longest_wait")[i].parse(), Ok(run.longest_wait));
+            assert_eq!(column(&rows, "longest_wait_bound")[i].parse(), Ok(run.longest_wait_bound));
+            assert_eq!(column(&rows, "longest_round")[i].parse(), Ok(run.longest_round));
+            assert_eq!(column(&rows, "longest_round_bound")[i].parse(), Ok(run.longest_round_bound));
             assert_eq!(column(&rows, "busy")[i].parse(), Ok(run.busy));
         }
         assert_eq!(column(&rows, "seconds")[0].parse(), Ok(made.runs[0].seconds));

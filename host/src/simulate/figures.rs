@@ -272,8 +272,8 @@ fn work(run: &Run) -> Figure {
     }
 }
 
-/// Efficiency over time from the fractions of the intervals.
-fn over_time(run: &Run, width: f64, class: &str, fractions: &[f64], title: &str) -> (String, String) {
+/// Efficiency over time from the fractions of the intervals: bars, and a line for those of the host, if there are any.
+fn over_time(run: &Run, width: f64, class: &str, fractions: &[f64], host: &[f64], title: &str) -> (String, String) {
     let size = fractions.len().div_ceil(MOST_INTERVALS).max(1);
     let groups = grouped(fractions, size);
     let interval = finite(run.interval_seconds);
@@ -281,7 +281,8 @@ fn over_time(run: &Run, width: f64, class: &str, fractions: &[f64], title: &str)
         if interval > 0.0 { (interval, Quantity::Seconds, "time") } else { (1.0, Quantity::Count, "interval") };
     let x = Axis::until(axis, quantity, length * fractions.len() as f64);
     let y = Axis::up_to("busy", Quantity::Share, highest(&groups).max(1.0));
-    let mut plot = Plot::new(width, HEIGHT, x, y, &[]);
+    let both = [(Key::Bar, class, "nodes"), (Key::Line, "s5", "host")];
+    let mut plot = Plot::new(width, HEIGHT, x, y, if host.is_empty() { &[] } else { &both });
     let bar = |group: &Group| {
         let (from, to) = (group.nodes.start as f64 * length, group.nodes.end as f64 * length);
         let shown = if interval > 0.0 { quantity.show(from) } else { format!("interval {}", group.nodes.start) };
@@ -289,6 +290,10 @@ fn over_time(run: &Run, width: f64, class: &str, fractions: &[f64], title: &str)
         Bar { from, to, base: 0.0, top: group.mean, title }
     };
     plot.bars(class, (0, 1), 0.12, &groups.iter().map(bar).collect::<Vec<_>>());
+    let middle = |group: &Group| (length * (group.nodes.start + group.nodes.end) as f64 / 2.0, group.mean);
+    if !host.is_empty() {
+        plot.line("s5", &grouped(host, size).iter().map(middle).collect::<Vec<_>>());
+    }
     let note = if interval > 0.0 {
         format!("Each bar is an interval of {}.", Quantity::Seconds.show(interval * size as f64))
     } else {
@@ -300,7 +305,7 @@ fn over_time(run: &Run, width: f64, class: &str, fractions: &[f64], title: &str)
 fn one_node_over_time(run: &Run, which: &str, node: usize) -> Figure {
     let fractions: Vec<f64> = run.per_node[node].busy_intervals.iter().map(|f| finite(f64::from(*f))).collect();
     let title = format!("Efficiency over time of {which}");
-    let (svg, note) = over_time(run, WIDTH, "s0", &fractions, &title);
+    let (svg, note) = over_time(run, WIDTH, "s0", &fractions, &[], &title);
     let busy = Quantity::Seconds.show(run.per_node[node].busy_seconds);
     let text = format!("Node {node}, busy for {busy} in all. {note}");
     Figure { title, source: "figure 6.4", text, svg, wide: false }
@@ -314,11 +319,15 @@ fn sum_over_time(run: &Run) -> Figure {
     }
     fractions.iter_mut().for_each(|sum| *sum /= run.per_node.len() as f64);
     let title = "Efficiency over time, all nodes".to_string();
-    let (svg, note) = over_time(run, WIDE, "s2", &fractions, &title);
+    let host: Vec<f64> = run.host_busy_intervals.iter().map(|f| finite(f64::from(*f))).collect();
+    let (svg, note) = over_time(run, WIDE, "s2", &fractions, &host, &title);
     Figure {
         title,
         source: "figures 6.5 and 6.7",
-        text: format!("Busy time of all nodes over what they had. {note} Loading and gathering are not in it."),
+        text: format!(
+            "Busy time of all nodes over what they had; the line is the host's, with the messages that it takes in and sends. \
+             {note} Loading and gathering are not in it."
+        ),
         svg,
         wide: true,
     }

@@ -46,7 +46,8 @@ fn films(report: &Report) -> String {
 fn table(report: &Report) -> String {
     let mut out = String::from(
         "<div class=\"scroll\"><table><thead><tr><th>Nodes</th><th class=\"name\">Scheduler</th><th>Time</th><th>Speed-up</th>\
-         <th>Efficiency</th><th>Busy (eq. 6.2)</th><th>Loading</th><th>Gathering</th><th>Messages</th><th>Bytes</th>\
+         <th>Efficiency</th><th>Busy (eq. 6.2)</th><th>Loading</th><th>Gathering</th>\
+         <th>Longest without a ray's end</th><th>at most</th><th>Messages</th><th>Bytes</th>\
          <th>Memory</th><th>Rays</th><th>Forwarded</th></tr></thead><tbody>\n",
     );
     for (i, run) in report.runs.iter().enumerate() {
@@ -63,6 +64,8 @@ fn table(report: &Report) -> String {
             Quantity::Share.show(run.busy),
             Quantity::Seconds.show(run.loading_seconds),
             Quantity::Seconds.show(run.gathering_seconds),
+            Quantity::Seconds.show(run.longest_gap),
+            Quantity::Seconds.show(run.longest_gap_bound),
             count(run.messages),
             Quantity::Bytes.show(run.bytes as f64),
             Quantity::Bytes.show(run.memory_high_water as f64),
@@ -182,6 +185,17 @@ mod tests {
         let busiest = run.per_node.iter().max_by(|a, b| a.busy_seconds.total_cmp(&b.busy_seconds)).unwrap();
         let busy: Vec<f64> = busiest.busy_intervals.iter().map(|f| f64::from(*f)).collect();
         proportional(&heights("Efficiency over time of the busiest node", "s0"), &busy);
+        let host: Vec<f64> = run.host_busy_intervals.iter().map(|f| f64::from(*f)).collect();
+        let line = figure(&document, "run-0", "Efficiency over time, all nodes");
+        let points = line.descendants().find(|n| n.has_tag_name("polyline")).unwrap().attribute("points").unwrap();
+        let depths: Vec<f64> = points.split(' ').map(|p| p.split_once(',').unwrap().1.parse().unwrap()).collect();
+        // What is higher has less of the picture above it.
+        let (top, bottom) =
+            (depths.iter().copied().fold(f64::MAX, f64::min), depths.iter().copied().fold(0.0, f64::max));
+        let (most, least) = (host.iter().copied().fold(0.0, f64::max), host.iter().copied().fold(1.0, f64::min));
+        let expected = host.iter().map(|share| bottom + (top - bottom) * (share - least) / (most - least));
+        assert_eq!(depths.len(), host.len());
+        assert!(depths.iter().zip(expected).all(|(y, expected)| (y - expected).abs() < 0.02), "the host's line");
         let sums: Vec<f64> =
             (0..busy.len()).map(|t| run.per_node.iter().map(|node| f64::from(node.busy_intervals[t])).sum()).collect();
         proportional(&heights("Efficiency over time, all nodes", "s2"), &sums);
@@ -249,6 +263,7 @@ mod tests {
             let value = awkward[i];
             (run.seconds, run.speedup, run.efficiency, run.busy) = (value, value, value, value);
             (run.interval_seconds, run.loading_seconds, run.gathering_seconds) = (value, value, value);
+            (run.longest_gap, run.longest_gap_bound, run.host_busy_intervals) = (value, value, vec![value as f32; i]);
             run.memory_limit = [None, Some(0), Some(u64::MAX)][i % 3];
             for node in &mut run.per_node {
                 node.busy_seconds = value;

@@ -45,6 +45,18 @@ pub struct Run {
     pub loading_seconds: f64,
     /// Virtual seconds in which the finished tiles come to the host. Not part of `seconds`.
     pub gathering_seconds: f64,
+    /// The longest virtual seconds from one ray's end to the next, anywhere.
+    pub longest_gap: f64,
+    /// What that is at most (docs/PROGRESS.md).
+    pub longest_gap_bound: f64,
+    /// The longest virtual seconds in which no node traced.
+    pub longest_wait: f64,
+    /// What that is at most.
+    pub longest_wait_bound: f64,
+    /// The longest virtual seconds from asking for a page, or sending rays, to the answer.
+    pub longest_round: f64,
+    /// What that is at most.
+    pub longest_round_bound: f64,
     /// Messages sent by all nodes.
     pub messages: u64,
     /// Bytes sent by all nodes, headers included.
@@ -61,6 +73,8 @@ pub struct Run {
     pub rays: Rays,
     /// One entry for each node, by node number.
     pub per_node: Vec<NodeRun>,
+    /// Fraction of each interval of the run in which the host worked, 0 to 1: what it took in and sent.
+    pub host_busy_intervals: Vec<f32>,
     /// Virtual seconds that one entry of [`NodeRun::busy_intervals`] covers.
     pub interval_seconds: f64,
 }

@@ -4,11 +4,11 @@
 //! made once for all the others.
 
 use super::record::{NodeRun, QueueRun, Rays, Run};
-use crate::partition::{Misfit, owners};
+use crate::partition::{Fit, NoFit, Wanted};
 use crate::prepare::Prepared;
 use hybray_link::Peer;
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{Options, Outcome, Plan, Progress, Settings, Sizes};
+use hybray_scheduler::{Options, Outcome, Progress, Settings, Sizes};
 use hybray_simulated::{Budget, Farm, Machine, SimulateError, Simulated, simulate};
 use hybray_tracer::Scene;
 use hybray_wire::{Counts, Frame};
@@ -69,18 +69,14 @@ impl<'a> Experiment<'a> {
         }
     }
 
-    /// Who owns which page, if each of so many nodes has `memory`.
-    ///
-    /// # Errors
-    /// If they do not fit: what would do.
-    pub fn owners(&self, nodes: Peer, memory: u64) -> Result<Vec<u16>, RunError> {
+    /// Who owns which page, and what every node is made of, if nodes have a budget.
+    fn fit(&self, nodes: Peer) -> Result<Option<Fit>, NoFit> {
+        // The one-node run has unlimited memory (DESIGN section 12).
+        let Some(memory) = self.memory.filter(|_| nodes > 1) else { return Ok(None) };
+        let (sizes, page_memory, policy) = (Sizes::of(self.scene), self.page_memory, self.settings.policy);
         let packed = &self.prepared.packed;
-        let mut plan =
-            Plan::new(Sizes::of(self.scene), nodes, memory, None, self.settings.policy).map_err(SimulateError::Plan)?;
-        if let Some(bytes) = self.page_memory {
-            plan = plan.with_page_memory(bytes, nodes, None);
-        }
-        Ok(owners(&packed.placed_pages(), packed.voxels(), nodes, plan.owned_bytes_max())?)
+        let wanted = Wanted { sizes, nodes, memory, page_memory, policy };
+        wanted.fit(&packed.placed_pages(), packed.voxels()).map(Some)
     }
 
     /// Draws it on so many nodes. `watch` is called often; the picture ends as it is when it returns false.
@@ -88,15 +84,17 @@ impl<'a> Experiment<'a> {
     /// # Errors
     /// See [`simulate`].
     pub fn simulated(&self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Simulated, RunError> {
-        let Self { machine, dispatcher, options, settings, .. } = *self;
-        // The one-node run has unlimited memory (DESIGN section 12).
-        let memory = self.memory.filter(|_| nodes > 1);
-        let owners = memory.map(|memory| self.owners(nodes, memory)).transpose()?;
-        let budget = memory.zip(owners.as_deref()).map(|(memory, owners)| Budget {
-            memory,
-            page_memory: self.page_memory,
-            owners,
-        });
+        self.simulated_with(nodes, self.fit(nodes)?.as_ref(), watch)
+    }
+
+    fn simulated_with(
+        &self,
+        nodes: Peer,
+        fit: Option<&Fit>,
+        watch: &mut dyn FnMut(Progress) -> bool,
+    ) -> Result<Simulated, RunError> {
+        let Self { machine, dispatcher, options, settings, page_memory, .. } = *self;
+        let budget = self.memory.zip(fit).map(|(memory, fit)| Budget { memory, page_memory, owners: &fit.owners });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
     }
@@ -107,19 +105,25 @@ impl<'a> Experiment<'a> {
     /// See [`simulate`]; and when a picture ends unfinished for any other reason.
     pub fn run(&mut self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Option<Run>, RunError> {
         if self.alone.is_none() {
-            let Some(alone) = self.finished(1, watch)? else { return Ok(None) };
+            let Some(alone) = self.finished(1, None, watch)? else { return Ok(None) };
             self.alone = Some(alone);
         }
-        let many = if nodes == 1 { None } else { self.finished(nodes, watch)? };
+        let fit = self.fit(nodes)?;
+        let many = if nodes == 1 { None } else { self.finished(nodes, fit.as_ref(), watch)? };
         let Some(alone) = &self.alone else { return Ok(None) };
         match &many {
             None if nodes != 1 => Ok(None),
-            many => Ok(Some(self.record(many.as_ref().unwrap_or(alone), alone.time_ns))),
+            many => Ok(Some(self.record(many.as_ref().unwrap_or(alone), fit.as_ref(), alone.time_ns))),
         }
     }
 
-    fn finished(&self, nodes: Peer, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Option<Simulated>, RunError> {
-        let run = self.simulated(nodes, watch)?;
+    fn finished(
+        &self,
+        nodes: Peer,
+        fit: Option<&Fit>,
+        watch: &mut dyn FnMut(Progress) -> bool,
+    ) -> Result<Option<Simulated>, RunError> {
+        let run = self.simulated_with(nodes, fit, watch)?;
         match run.outcome {
             Outcome::Finished => Ok(Some(run)),
             Outcome::Stopped => Ok(None),
@@ -127,20 +131,16 @@ impl<'a> Experiment<'a> {
         }
     }
 
-    fn record(&self, run: &Simulated, alone_ns: u64) -> Run {
+    fn record(&self, run: &Simulated, fit: Option<&Fit>, alone_ns: u64) -> Run {
         let mut counts = Counts::default();
         run.nodes.iter().for_each(|node| counts += node.report.counts);
         let speedup = alone_ns as f64 / run.time_ns.max(1) as f64;
         let packed = &self.prepared.packed;
-        let owners = self
-            .memory
-            .filter(|_| run.nodes.len() > 1)
-            .and_then(|memory| self.owners(run.nodes.len() as Peer, memory).ok());
         let mut held = vec![(0u64, 0u64); run.nodes.len()];
         for page in 0..packed.pages() as u32 {
             let primitives = u64::from(packed.primitives_of(page));
-            let nodes = match &owners {
-                Some(owners) => usize::from(owners[page as usize]) - 1..usize::from(owners[page as usize]),
+            let nodes = match fit.map(|fit| usize::from(fit.owners[page as usize])) {
+                Some(owner) => owner - 1..owner,
                 None => 0..run.nodes.len(),
             };
             for (count, pages) in &mut held[nodes] {
@@ -159,14 +159,8 @@ impl<'a> Experiment<'a> {
             forwarded: node.exchange.forwarded,
             fetched_pages: node.exchange.fetched,
             queues: queues(node),
-            busy_seconds: seconds(node.busy_ns.iter().sum()),
-            busy_intervals: (0..)
-                .zip(&node.busy_ns)
-                .map(|(interval, &busy)| {
-                    let length = run.interval_ns.min(run.time_ns - interval * run.interval_ns);
-                    busy as f32 / length.max(1) as f32
-                })
-                .collect(),
+            busy_seconds: seconds(node.busy_ns.iter().sum::<u64>().into()),
+            busy_intervals: shares(&node.busy_ns, run),
             sent_messages: node.traffic.sent_frames,
             sent_bytes: node.traffic.sent_bytes,
             memory_high_water: memory(node),
@@ -175,12 +169,18 @@ impl<'a> Experiment<'a> {
         Run {
             nodes: run.nodes.len() as u32,
             scheduler: name_of(self.settings.policy).to_owned(),
-            seconds: seconds(run.time_ns),
+            seconds: seconds(run.time_ns.into()),
             speedup,
             efficiency: speedup / run.nodes.len() as f64,
             busy: run.busy(),
-            loading_seconds: seconds(run.loading_ns),
-            gathering_seconds: seconds(run.gathering_ns),
+            loading_seconds: seconds(run.loading_ns.into()),
+            gathering_seconds: seconds(run.gathering_ns.into()),
+            longest_gap: seconds(run.longest.gap_ns.into()),
+            longest_gap_bound: seconds(run.bound.gap_ns),
+            longest_wait: seconds(run.longest.wait_ns.into()),
+            longest_wait_bound: seconds(run.bound.wait_ns),
+            longest_round: seconds(run.longest.round_ns.into()),
+            longest_round_bound: seconds(run.bound.round_ns),
             messages: run.nodes.iter().map(|node| node.traffic.sent_frames).sum(),
             bytes: run.nodes.iter().map(|node| node.traffic.sent_bytes).sum(),
             memory_high_water: run.nodes.iter().map(memory).max().unwrap_or(0),
@@ -189,7 +189,8 @@ impl<'a> Experiment<'a> {
             events: format!("{:016x}", run.events),
             rays: Rays { primary: counts.primary, secondary: counts.secondary, shadow: counts.shadow, forwarded },
             per_node: nodes.collect(),
-            interval_seconds: seconds(run.interval_ns),
+            host_busy_intervals: shares(&run.host_busy_ns, run),
+            interval_seconds: seconds(run.interval_ns.into()),
         }
     }
 }
@@ -202,7 +203,7 @@ pub enum RunError {
     Simulate(#[from] SimulateError),
     /// The pages do not fit.
     #[error(transparent)]
-    Misfit(#[from] Misfit),
+    NoFit(#[from] NoFit),
     /// The machines say so, and that is a bug.
     #[error("the picture on {nodes} nodes is not finished but {outcome:?}: please report this, with the scene")]
     Unfinished {
@@ -213,8 +214,19 @@ pub enum RunError {
     },
 }
 
-fn seconds(nanoseconds: u64) -> f64 {
+/// Seconds, of whole nanoseconds.
+#[must_use]
+pub fn seconds(nanoseconds: u128) -> f64 {
     nanoseconds as f64 * 1e-9
+}
+
+/// Which part of each interval of a run is busy time.
+fn shares(busy_ns: &[u64], run: &Simulated) -> Vec<f32> {
+    let share = |(interval, &busy): (u64, &u64)| {
+        let length = run.interval_ns.min(run.time_ns - interval * run.interval_ns);
+        busy as f32 / length.max(1) as f32
+    };
+    (0..).zip(busy_ns).map(share).collect()
 }
 
 fn rays(counts: &Counts) -> u64 {

@@ -52,6 +52,54 @@ fn how_nodes_work_changes_the_run_and_not_the_film() {
     }
 }
 
+/// Memory for a part of the scene's pages: what is cached is less, and the picture is the same.
+#[test]
+fn page_memory_is_a_part_of_the_scene() {
+    let folder = Folder::new();
+    let usual = "spd:balls:4 --machine gigabit --nodes 16 --memory 1MiB --size 64x64 --spp 1 --page-bytes 4096";
+    let all = &runs(&folder, usual)[0];
+    let fetched = |run: &Value| {
+        run["per_node"].as_array().unwrap().iter().map(|n| n["fetched_pages"].as_u64().unwrap()).sum::<u64>()
+    };
+    assert_eq!(fetched(all), 0, "every node has every page");
+    let part = &runs(&folder, &format!("{usual} --page-memory 1/16"))[0];
+    assert_eq!(part["film"], all["film"]);
+    assert!(fetched(part) > 100, "{}", fetched(part));
+    // 323,264 bytes of pages (docs/MEMORY.md), over 16.
+    assert_eq!(runs(&folder, &format!("{usual} --page-memory 20204"))[0], *part);
+    assert!(part["memory_high_water"].as_u64() < all["memory_high_water"].as_u64());
+}
+
+#[test]
+fn times_without_a_rays_end_are_within_what_is_said() {
+    let folder = Folder::new();
+    let all = runs(&folder, "spd:balls:4 --machine powerxplorer --nodes 1,8 --memory 256KiB --size 64x64 --spp 1");
+    let (_, out) = folder.succeed("plan spd:balls:4 --nodes 8 --memory 256KiB --machine powerxplorer --json -");
+    let plan: Value = serde_json::from_slice(&out).unwrap();
+    let number = |of: &Value, name: &str| of[name].as_f64().unwrap();
+    for run in &all {
+        for name in ["longest_gap", "longest_wait", "longest_round"] {
+            let (longest, most) = (number(run, name), number(run, &format!("{name}_bound")));
+            assert!(longest <= most, "{name}: {longest} of {most}");
+        }
+        assert!(number(run, "longest_gap") > 0.0 && number(run, "longest_gap") < number(run, "seconds"));
+    }
+    // What is planned is what was simulated, but for the tiles: the plan's are those of the scene's own picture.
+    let near = |name: &str, planned: &str| {
+        let (run, planned) = (number(&all[1], &format!("longest_{name}_bound")), number(&plan["progress"], planned));
+        assert!((0.9..=1.0).contains(&(run / planned)), "{name}: {run} of {planned}");
+    };
+    near("gap", "gap_seconds");
+    near("wait", "wait_seconds");
+    assert_eq!(plan["progress"]["machine"], "powerxplorer");
+    let (_, out) = folder.succeed("plan spd:balls:4 --nodes 8 --memory 256KiB --machine powerxplorer");
+    let said = String::from_utf8(out).unwrap();
+    let seconds = format!("{:.6} s  from the end of a ray to the next", number(&plan["progress"], "gap_seconds"));
+    assert!(said.contains(&seconds), "{said}");
+    let (_, out) = folder.succeed("plan spd:balls:4 --nodes 8 --memory 256KiB --json -");
+    assert!(serde_json::from_slice::<Value>(&out).unwrap()["progress"].is_null());
+}
+
 #[test]
 fn mistakes() {
     let folder = Folder::new();
@@ -71,6 +119,11 @@ fn mistakes() {
         1,
         &["--memory 9KiB", "2 nodes", "give --memory"],
     );
+    let two = "spd:balls:1 --machine threads --nodes 2";
+    check(&format!("{two} --page-memory 1/4"), 2, &["--memory"]);
+    for wrong in ["2/3", "1/0", "1/", "half"] {
+        check(&format!("{two} --memory 1MiB --page-memory {wrong}"), 2, &[wrong, "512KiB", "1/16"]);
+    }
     check("spd:balls:1 --machine threads --nodes 2 --json - --csv -", 1, &["only one", "standard output"]);
     check("nosuch.nff --machine threads --nodes 2", 1, &["nosuch.nff", "no such file"]);
     assert!(folder.names().is_empty());

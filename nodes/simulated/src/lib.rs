@@ -6,6 +6,8 @@
 //! section 12). Nothing here reads a clock or starts a thread.
 #![forbid(unsafe_code)]
 
+mod bound;
+mod gaps;
 mod machine;
 mod meter;
 mod schedule;
@@ -14,6 +16,8 @@ mod turn;
 mod worker;
 mod world;
 
+pub use bound::Bound;
+pub use gaps::Longest;
 pub use hybray_scheduler::Traffic as Exchange;
 pub use hybray_sim::{LinkCounts, LinkModel, Network, NetworkModel, Topology, Traffic};
 pub use machine::{Costs, MACHINES, Machine, MessageCosts, Operations};
@@ -99,6 +103,8 @@ pub struct NodeRun {
     pub exchange: Exchange,
     /// Most that was ever in use.
     pub high_water: HighWater,
+    /// Rays that ended here.
+    pub ended: u64,
 }
 
 /// A picture, and what it took.
@@ -116,12 +122,18 @@ pub struct Simulated {
     pub time_ns: u64,
     /// From then until the film has everything; 0 if it never had.
     pub gathering_ns: u64,
-    /// Length of the intervals of [`NodeRun::busy_ns`].
+    /// How long nothing came of it at worst.
+    pub longest: Longest,
+    /// What these are at most, if nothing is wrong with the network.
+    pub bound: Bound,
+    /// Length of the intervals of [`NodeRun::busy_ns`] and of the host's.
     pub interval_ns: u64,
     /// Each node, from node 1 on.
     pub nodes: Vec<NodeRun>,
     /// The host's frames and bytes.
     pub host: Traffic,
+    /// Time that the host spent on messages, by interval, as [`NodeRun::busy_ns`].
+    pub host_busy_ns: Vec<u64>,
     /// Every directed physical link.
     pub links: Vec<LinkCounts>,
     /// Frames and bytes of each kind of message, to others.
@@ -218,7 +230,9 @@ pub fn simulate_spoiled(
     let server = PageServer::new(&mut asked, &mut turns);
     let mut world = world::World::new(farm, plan, master, &mut states, server, pages, workers);
     spoil(world.network());
-    world.run(watch)
+    let delay_ns = world.network().delay_ns_max();
+    let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, map.len(), delay_ns);
+    Ok(Simulated { bound, ..world.run(watch)? })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use hybray_sim::Network;
 use hybray_wire::{View, decode};
 
 /// Frames taken in before the next look at other work, as in `nodes/runner`.
-const FRAMES: usize = 64;
+pub(crate) const FRAMES: usize = 64;
 
 /// What arrived.
 pub(crate) enum Arrival<'a> {

@@ -1,5 +1,6 @@
 //! A participant's turn at sending: what each frame costs, and when it leaves.
 
+use crate::gaps::Gaps;
 use crate::machine::Machine;
 use crate::worker::{records, timed};
 use hybray_link::{Event, Link, Peer};
@@ -46,6 +47,7 @@ pub(crate) struct Turn<'a> {
     /// Time spent on the run that ends next, and on everything.
     pub run_ns: &'a mut u64,
     pub computing_ns: u64,
+    pub gaps: &'a mut Gaps,
     pub said: Said,
 }
 
@@ -64,7 +66,7 @@ impl Link for Turn<'_> {
     }
 
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
-        let Self { network, machine, me, now_ns, run_ns, computing_ns, said } = self;
+        let Self { network, machine, me, now_ns, run_ns, computing_ns, gaps, said } = self;
         network.send(*me, to, *now_ns, bytes_max, &mut |room| {
             let mut used = write(room);
             let message = decode(&room[..used]).ok().map(|view| view.message);
@@ -78,6 +80,7 @@ impl Link for Turn<'_> {
                 let (frames, bytes) = &mut said.kinds[kind(message.as_ref())];
                 *frames += 1;
                 *bytes += used as u64;
+                message.iter().for_each(|message| gaps.said(*me, to, message, *now_ns));
             }
             said.frames += 1;
             let leaves_ns = *now_ns + said.spent_ps / 1000;

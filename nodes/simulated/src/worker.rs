@@ -59,6 +59,11 @@ impl<'s> Worker<'s> {
         self.node.finished_tiles()
     }
 
+    /// Rays that have ended here.
+    pub fn ended(&self) -> u64 {
+        self.node.ended()
+    }
+
     /// What it did besides tracing.
     pub fn exchange(&self) -> Traffic {
         self.node.traffic()

@@ -1,12 +1,13 @@
 //! The world: everybody's turns, one after the other on one clock.
 
+use crate::gaps::Gaps;
 use crate::machine::Operations;
 use crate::meter::Meter;
 use crate::schedule::{Phase, Schedule};
 use crate::take::{Arrival, Taken, take};
 use crate::turn::{KINDS, Said, Turn};
 use crate::worker::Worker;
-use crate::{Farm, NodeRun, SimulateError, Simulated};
+use crate::{Bound, Farm, NodeRun, SimulateError, Simulated};
 use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
@@ -23,6 +24,8 @@ struct Seat<'s> {
     worker: Worker<'s>,
     /// Tiles of its own that are finished.
     finished: u32,
+    /// Rays that have ended there.
+    ended: u64,
     operations: Operations,
     /// Time spent on the run that ends next.
     run_ns: u64,
@@ -45,6 +48,7 @@ pub(crate) struct World<'a, 'm, 's> {
     plan: Plan,
     schedule: Schedule,
     meter: Meter,
+    gaps: Gaps,
     /// Parts of nanoseconds that each participant still owes.
     owed_ps: Vec<u64>,
     first_tiles_ns: Option<u64>,
@@ -82,6 +86,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
                 .map(|worker| Seat {
                     worker,
                     finished: 0,
+                    ended: 0,
                     operations: Operations::default(),
                     run_ns: 0,
                     computing_ns: 0,
@@ -90,7 +95,8 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
                 .collect(),
             plan,
             schedule: Schedule::new(peers),
-            meter: Meter::new(usize::from(farm.nodes)),
+            meter: Meter::new(peers),
+            gaps: Gaps::default(),
             owed_ps: vec![0; usize::from(peers)],
             first_tiles_ns: None,
             finished_ns: 0,
@@ -182,11 +188,12 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             self.master.stop();
         }
         let spent_ns = self.nanoseconds(HOST, spent_ps);
+        self.meter.work(HOST, now, now + spent_ns);
         self.go_on(HOST, now, spent_ns, frames > 0);
     }
 
     fn take_node(&mut self, me: Peer, now: u64) {
-        let Self { network, dispatcher, seats, farm, .. } = self;
+        let Self { network, dispatcher, seats, farm, gaps, pages, .. } = self;
         let number = usize::from(me) - 1;
         let seat = &mut seats[number];
         let dispatches = farm.dispatcher == me;
@@ -195,12 +202,14 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
                 if dispatches {
                     dispatcher.handle(from, &view.message, now);
                 }
+                gaps.heard(me, from, &view.message, pages, now);
                 seat.worker.handle(from, &view);
             }
             Arrival::Lost { peer } => {
                 if dispatches {
                     dispatcher.lost(peer);
                 }
+                gaps.lost(me, peer);
                 seat.worker.lost(peer);
             }
             Arrival::Nonsense => {}
@@ -219,13 +228,18 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
         let spent_ns = self.nanoseconds(me, taken.spent_ps + step_ps);
         if step_ps > 0 {
             self.progress.0 = self.network.delivered();
+            self.gaps.traced(now, now + spent_ns);
         }
         let seat = &mut self.seats[number];
         let finished = seat.worker.finished_tiles();
         if core::mem::replace(&mut seat.finished, finished) != finished {
             self.finished_ns = self.finished_ns.max(now + spent_ns);
         }
-        self.meter.work(number, now, now + spent_ns);
+        let ended = seat.worker.ended();
+        if core::mem::replace(&mut seat.ended, ended) != ended {
+            self.gaps.ended(now, now + spent_ns);
+        }
+        self.meter.work(me, now, now + spent_ns);
         self.go_on(me, now, spent_ns, worked || taken.frames > 0);
     }
 
@@ -239,7 +253,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
     }
 
     fn send(&mut self, me: Peer, now: u64, busy: bool) {
-        let Self { network, master, dispatcher, server, pages, seats, farm, .. } = self;
+        let Self { network, master, dispatcher, server, pages, seats, farm, gaps, .. } = self;
         let machine = farm.machine;
         let seat = usize::from(me).checked_sub(1).map(|number| &mut seats[number]);
         let mut no_run = 0;
@@ -247,7 +261,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             Some(Seat { worker, run_ns, computing_ns, .. }) => (Some(worker), run_ns, *computing_ns),
             None => (None, &mut no_run, 0),
         };
-        let mut turn = Turn { network, machine, me, now_ns: now, run_ns, computing_ns, said: Said::default() };
+        let mut turn = Turn { network, machine, me, now_ns: now, run_ns, computing_ns, gaps, said: Said::default() };
         let mut stopped = false;
         match worker {
             Some(worker) => {
@@ -273,12 +287,13 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
         if let (None, Some(first)) = (self.first_tiles_ns, first_tiles_ns) {
             self.first_tiles_ns = Some(first);
             self.meter.begin(first);
+            self.gaps.begin(first);
         }
         let spent_ns = self.nanoseconds(me, spent_ps);
         if let Some(number) = usize::from(me).checked_sub(1) {
             self.seats[number].messaging_ns += spent_ps / 1000;
-            self.meter.work(number, now, now + spent_ns);
         }
+        self.meter.work(me, now, now + spent_ns);
         if stopped {
             self.schedule.leave(me);
         } else if busy || frames > 0 {
@@ -320,6 +335,9 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
         let first = self.first_tiles_ns.unwrap_or(0);
         let until = self.finished_ns.max(first);
         let (interval_ns, busy) = self.meter.end(until);
+        let mut busy = busy.into_iter();
+        let host_busy_ns = busy.next().unwrap_or_default();
+        let longest = self.gaps.end(until, |peer| self.network.is_gone(peer));
         let network = &self.network;
         let nodes = self.seats.iter().zip(busy).enumerate().map(|(number, (seat, busy_ns))| NodeRun {
             report: self.master.reports()[number + 1],
@@ -330,6 +348,7 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             traffic: network.traffic(number as Peer + 1),
             exchange: seat.worker.exchange(),
             high_water: seat.worker.high_water(),
+            ended: seat.ended,
         });
         Simulated {
             outcome,
@@ -338,9 +357,12 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             loading_ns: first,
             time_ns: until - first,
             gathering_ns: self.gathered_ns.map_or(0, |gathered| gathered.saturating_sub(until)),
+            longest,
+            bound: Bound::default(),
             interval_ns,
             nodes: nodes.collect(),
             host: network.traffic(HOST),
+            host_busy_ns,
             links: network.links().collect(),
             kinds: KINDS.into_iter().zip(self.kinds).collect(),
             frames: network.delivered(),

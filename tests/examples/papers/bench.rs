@@ -9,7 +9,7 @@ use hybray::prepare::Prepared;
 use hybray::simulate::runs::{Experiment, RunError};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{Options, Outcome, Sizes};
-use hybray_simulated::{Machine, NodeRun, SimulateError, Simulated};
+use hybray_simulated::{Machine, NodeRun, Simulated};
 use hybray_tests::scene;
 use rayon::prelude::*;
 
@@ -293,7 +293,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     match experiment.simulated(job.nodes, goes_on) {
         Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run)),
         Ok(run) => Err(failed(format!("{:?}", run.outcome))),
-        Err(RunError::Misfit(_) | RunError::Simulate(SimulateError::Plan(_))) => Err(Without::Memory),
+        Err(RunError::NoFit(_)) => Err(Without::Memory),
         Err(error) => Err(failed(error.to_string())),
     }
 }

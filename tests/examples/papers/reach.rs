@@ -46,7 +46,7 @@ pub fn goals(bench: &Bench, published: &Published) -> Result<String> {
             let mut line = vec![goal.case.to_owned(), goal.published.clone(), goal.floor.text(), dispatcher.to_owned()];
             line.extend(figures(bench, &job, &goal.floor));
             let option = if is_dispatched_by_node { " --dispatcher node" } else { "" };
-            line.push(format!("`{}{}`", goal.command, if goal.command.starts_with("hybray") { option } else { "" }));
+            line.push(format!("`{}{option}`", goal.command));
             table.row(line);
         }
     }
@@ -114,7 +114,10 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
         format!("hybray simulate {scene} --machine powerxplorer --nodes {nodes} --memory 32MiB --spp 1")
     };
     let farm = |scene: &str| format!("hybray simulate {scene} --machine cc48 --nodes 38 --spp 1");
-    let only = || "cargo xtask papers --only reach".to_owned();
+    let part = |scene: &str, share: u64| {
+        let pages = format!("--page-memory 1/{share} --page-bytes 4096");
+        format!("hybray simulate {scene} --machine powerxplorer --nodes 32 --memory 32MiB {pages} --spp 1")
+    };
     let level = |level: &'static str, case: &'static str| -> Result<Goal> {
         let scene = format!("paper:balls:{level}");
         Ok(Goal {
@@ -147,14 +150,14 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
             published: seconds(large, "balls5_hybrid_s")?,
             floor: Floor::Efficiency(0.7, None),
             job: Job::of_1995("paper:balls5", 32).with_share(16),
-            command: only(),
+            command: part("paper:balls5", 16),
         },
         Goal {
             case: "conference room, 30 lights, page memory a quarter of the scene, 32 nodes",
             published: seconds(large, "conference30_hybrid_s")?,
             floor: Floor::Efficiency(0.7, None),
             job: Job::of_1995("paper:conference:30", 32).with_share(4),
-            command: only(),
+            command: part("paper:conference:30", 4),
         },
         Goal {
             case: "POV||Ray's farm, 38 workers, courtyard",

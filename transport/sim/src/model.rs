@@ -1,5 +1,8 @@
 //! What a network is made of.
 
+use crate::route::Routes;
+use hybray_link::Peer;
+
 /// How participants are connected. The host is participant 0, nodes count from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topology {
@@ -51,4 +54,16 @@ pub struct NetworkModel {
 impl NetworkModel {
     /// Room where nothing says otherwise.
     pub const ROOM_FRAMES: u32 = 8;
+
+    /// The longest that a frame of at most `bytes_max` can be on its way between two of so many participants, nanoseconds:
+    /// on each link of the longest route it waits for every other frame that the network has room for and whose route has
+    /// the link, too. Participants read what arrives in their own time: until they do, it takes room.
+    #[must_use]
+    pub fn way_ns(&self, peers: Peer, bytes_max: u32) -> u128 {
+        let (links, pairs) = Routes::new(self, peers).most();
+        let crossing_ns = u128::from(self.link.crossing_ns(bytes_max).max(self.host_link.crossing_ns(bytes_max)));
+        let latency_ns = u128::from(self.link.latency_ns.max(self.host_link.latency_ns));
+        let frames = u128::from(pairs) * u128::from(self.room_frames.max(1));
+        u128::from(links) * (frames * crossing_ns + latency_ns)
+    }
 }

@@ -225,6 +225,12 @@ impl Network {
         self.set_going(at_ns, end);
     }
 
+    /// The most that a frame is delayed by chance, nanoseconds.
+    #[must_use]
+    pub fn delay_ns_max(&self) -> u64 {
+        self.delays.as_ref().map_or(0, |delays| delays.delay_ns_max)
+    }
+
     /// Whether a participant is no more.
     #[must_use]
     pub fn is_gone(&self, peer: Peer) -> bool {

@@ -43,6 +43,27 @@ impl Routes {
         links as usize
     }
 
+    /// Links of the longest route, and ordered pairs of participants whose routes have one link in common at most.
+    pub fn most(&self) -> (u64, u64) {
+        let peers = u64::from(self.peers);
+        let others = peers.saturating_sub(1);
+        match self.model.topology {
+            Topology::Bus => (1, peers * others),
+            Topology::Crossbar => (2, others),
+            Topology::Chain => (others, peers * peers / 4),
+            Topology::Mesh2d { columns } => {
+                let columns = u64::from(columns.max(1));
+                let rows = u64::from(self.routers) / columns;
+                // Behind link i of a row are i + 1 routers of that row, on the first one the host, too; before it, all
+                // that are farther to the right. Down a column it is the other way about.
+                let line = |length: u64, lines: u64| {
+                    (0..length).map(|i| (i + 2) * (length - i - 1) * lines).max().unwrap_or(0)
+                };
+                (columns + rows - 1, line(columns, rows).max(line(rows, columns)).max(others))
+            }
+        }
+    }
+
     /// What link `number` is like.
     pub fn link(&self, number: usize) -> &LinkModel {
         let host = match self.model.topology {
@@ -136,6 +157,35 @@ mod tests {
         check(Topology::Crossbar, 2, 7, &[2, 9, 7]);
         check(Topology::Bus, 2, 7, &[2, 7]);
         check(Topology::Bus, 5, 5, &[5]);
+    }
+
+    /// Every route of every pair, link by link.
+    #[test]
+    fn no_route_is_longer_and_no_link_has_more_pairs() {
+        for peers in 2..=20 {
+            let meshes = (1..=6).map(|columns| Topology::Mesh2d { columns });
+            for topology in [Topology::Bus, Topology::Crossbar, Topology::Chain].into_iter().chain(meshes) {
+                let link = LinkModel { latency_ns: 0, bytes_per_second: 1 };
+                let routes = Routes::new(&NetworkModel { topology, link, host_link: link, room_frames: 1 }, peers);
+                let mut pairs = vec![0; routes.links()];
+                let mut longest = 0;
+                for (from, to) in (0..peers).flat_map(|a| (0..peers).map(move |b| (a, b))).filter(|(a, b)| a != b) {
+                    let links = route(topology, peers, from, to).1;
+                    longest = longest.max(links.len() as u64);
+                    links.iter().for_each(|&link| pairs[link] += 1);
+                }
+                let (links, most) = routes.most();
+                let found = pairs.into_iter().max().unwrap_or(0);
+                let what = format!("{topology:?}, {peers}: {longest} of {links} links, {found} of {most} pairs");
+                assert!(longest <= links && found <= most, "{what}");
+                // It is what is there; of a mesh, where the host is one more in its corner, up to twice as many pairs.
+                let (is_mesh, whole) = match topology {
+                    Topology::Mesh2d { columns } => (true, (peers - 1) % columns == 0),
+                    _ => (false, true),
+                };
+                assert!(!whole || (longest == links && most <= if is_mesh { 2 * found } else { found }), "{what}");
+            }
+        }
     }
 
     /// A directed link leads from one place to one other, whoever uses it.

@@ -42,8 +42,8 @@ use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
 
 /// Tiles of a bundle.
 const TILES: usize = 4;
-/// Primary rays of a bundle.
-const BUNDLE: usize = TILES * TILE_PIXELS;
+/// Primary rays of a bundle at most.
+pub const BUNDLE: usize = TILES * TILE_PIXELS;
 /// Runs that wait.
 const RUNS: usize = 4;
 /// Pages that may be on their way here, the lane's not counted.
@@ -210,6 +210,8 @@ pub struct Node<'m, 's, P: Store> {
     stopped: bool,
     counts: Counts,
     walk_counts: hybray_bintree::walk::Counts,
+    /// Rays that have ended here.
+    ended: u64,
     traffic: Traffic,
     high_water: HighWater,
     /// The last step found nothing to do: what waits for company goes now.
@@ -264,6 +266,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             stopped: false,
             counts: Counts::default(),
             walk_counts: hybray_bintree::walk::Counts::default(),
+            ended: 0,
             traffic: Traffic::default(),
             high_water: HighWater::default(),
             idle: true,
@@ -301,6 +304,12 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.counts
     }
 
+    /// Rays that have ended here, whoever started them.
+    #[must_use]
+    pub fn ended(&self) -> u64 {
+        self.ended
+    }
+
     /// What it did besides tracing.
     #[must_use]
     pub fn traffic(&self) -> Traffic {
@@ -314,6 +323,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         HighWater {
             rays: (m.pool.high_water(), m.pool.capacity()),
             partials: (m.partials.high_water(), m.partials.capacity()),
+            // Who never asks for a page has what it was given.
+            page_bytes: self.high_water.page_bytes.max(self.store.bytes_held()),
             ..self.high_water
         }
     }
@@ -423,6 +434,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             lists: owed,
             owing,
             counts: Counts::default(),
+            ended: 0,
         };
         // With a budget the end of a run is begun a tile at a time: what is not begun can still be given to others.
         let square_from = match self.settings.bundle_tiles {
@@ -554,6 +566,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.depth = lane.depth();
         self.walk_counts += walker.counts;
         counts += sums.counts;
+        self.ended += sums.ended;
         self.counts += counts;
         let open = self.memory.tiles.iter().filter(|t| t.stage != TileStage::Free).count();
         self.high_water.tiles = (self.high_water.tiles.0.max(open), self.memory.tiles.len());

@@ -120,6 +120,8 @@ pub struct Sums<'a, 'm> {
     pub owing: &'a mut Ring<'m, u16>,
     /// Contributions.
     pub counts: Counts,
+    /// Rays that have ended.
+    pub ended: u64,
 }
 
 impl Sums<'_, '_> {
@@ -172,6 +174,7 @@ impl Sink for Sums<'_, '_> {
     }
 
     fn ended(&mut self, origin: &Origin, entry: u64) {
+        self.ended += 1;
         self.add(origin, [0; 3], entry);
     }
 }
