@@ -5,10 +5,12 @@
 
 mod budget;
 mod owners;
-mod replicas;
+mod pilot;
+mod placement;
 mod voxels;
 
 pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
 pub use owners::{Misfit, PlacedPage, owners};
-pub use replicas::replicas;
+pub use pilot::{Parts, Pilot};
+pub use placement::{Placement, place};
 pub use voxels::{Plan, Step, VOXELS_MAX, Voxels};
