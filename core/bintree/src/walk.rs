@@ -43,7 +43,7 @@ impl Hit {
 /// What a walk did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Wide nodes whose boxes were tested.
+    /// Wide nodes whose boxes were tested, and boxes of pages that a ray went past.
     pub nodes: u64,
     /// Blocks of primitives, and cones, that were tested.
     pub blocks: u64,
@@ -100,6 +100,12 @@ pub fn occluded(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut S
 /// The order in which a walk meets pages is a function of the ray and the directory alone: a walk that goes on from page P
 /// looks at P and at what comes after it, and never at what came before. So a ray that is handed from node to node, each
 /// of which walks the pages that it has, tests the same pages as one that finds all of them in one place, or fewer.
+///
+/// A walk for the nearest hit ends at the first page that is not at hand. One for any hit (`ANY`) goes past such pages,
+/// since whatever blocks it ends it. If nothing at hand does, its end is cut to where it leaves the last of them: beyond,
+/// all is known to be free. So a shadow ray tests what is kept around a light first, and does not come back there (DESIGN
+/// section 9; the 1995 report's chapter 4). Pages before that it may test again as it goes on. On the papers' scenes, with
+/// four pages in five elsewhere, that and the cuts were 3 to 7 % of the cells, for up to a quarter fewer rays forwarded.
 pub struct Walk<'w, 'a, const ANY: bool, P: Pages + ?Sized = [PageView<'a>]> {
     /// Where.
     pub scene: &'w Resident<'a, P>,
@@ -128,9 +134,9 @@ pub const FROM_ROOT: u32 = u32::MAX;
 /// How far a walk came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walked {
-    /// The best hit so far.
+    /// The best hit so far; if there is none, the distance up to which one is still to be looked for.
     pub best: Hit,
-    /// The page that it needs next and that is not at hand.
+    /// The page that it needs next and that is not at hand: the first of them in the order of the walk.
     pub needs: Option<u32>,
 }
 
@@ -183,7 +189,7 @@ struct Walker<S: Simd> {
 }
 
 impl<S: Simd> Walker<S> {
-    /// Through the directory, from page to page; the page that is needed and not at hand.
+    /// Through the directory, from page to page; the first page that is needed and not at hand.
     #[inline(always)]
     fn directory<const ANY: bool, P: Pages + ?Sized>(
         &mut self,
@@ -195,6 +201,7 @@ impl<S: Simd> Walker<S> {
         if scene.directory.nodes.is_empty() {
             return None;
         }
+        let (mut needs, mut last) = (None, f32::NEG_INFINITY);
         waiting[0] = (self.kernel.t_min, Child::Inner(0).pack());
         let mut top = if from == FROM_ROOT { 1 } else { self.descend(scene, from, waiting) };
         while top > 0 {
@@ -206,7 +213,15 @@ impl<S: Simd> Walker<S> {
             match Child::unpack(packed) {
                 Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
                 Child::Page(page) => {
-                    let Some(view) = scene.pages.page(page) else { return Some(page) };
+                    let Some(view) = scene.pages.page(page) else {
+                        if !ANY {
+                            return Some(page);
+                        }
+                        needs = needs.or(Some(page));
+                        let exit = self.exit(scene, page);
+                        last = if exit > last { exit } else { last };
+                        continue;
+                    };
                     self.counts.pages += 1;
                     self.page::<ANY>(page, &view, waiting, top);
                     if ANY && self.best.candidate.is_hit() {
@@ -216,7 +231,21 @@ impl<S: Simd> Walker<S> {
                 Child::Leaf { .. } | Child::Unused => {}
             }
         }
-        None
+        if needs.is_some() && last < self.best.candidate.t {
+            self.best.candidate.t = last;
+        }
+        needs
+    }
+
+    /// Where the ray leaves the box of a page that is not at hand, rounded as in every slab: no hit in the page lies beyond.
+    /// Infinity where nobody says where the page hangs.
+    #[inline(never)]
+    fn exit<P: Pages + ?Sized>(&mut self, scene: &Resident<'_, P>, page: u32) -> f32 {
+        let nodes = scene.directory.nodes;
+        let parent = scene.pages.parents().get(nodes.len().saturating_add(page as usize));
+        let Some(&parent) = parent.filter(|&&parent| parent != NO_PARENT) else { return f32::INFINITY };
+        self.counts.nodes += 1;
+        self.kernel.slab(&nodes[parent as usize / WIDTH].aabb(parent as usize % WIDTH)).1
     }
 
     /// The stack as it was when the walk came to `page`, which is on top of it; returns its length. Along the way from the

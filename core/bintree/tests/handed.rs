@@ -1,5 +1,5 @@
 //! Walks that are handed from store to store, each with some of the pages: the hit of one walk, to the bit, through the
-//! same pages in the same order, or fewer.
+//! same pages in the same order, or fewer. A walk for any hit goes past pages that are not at hand, and cuts the ray.
 
 mod common;
 
@@ -8,8 +8,8 @@ use common::{Built, Random, Rule, Shapes, build, rays};
 use hybray_bintree::walk::{Counts, FROM_ROOT, Hit, Resident, Stack, Walk, Walked, nearest, occluded};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
-use hybray_geometry::{Candidate, Ray};
-use hybray_scene::{Directory, NO_PARENT, PageView, Pages, parents};
+use hybray_geometry::{Aabb, Candidate, Ray, Vec3};
+use hybray_scene::{Child, Directory, NO_PARENT, PageView, Pages, parents};
 use std::cell::RefCell;
 
 /// Some of a scene's pages, and which of them were looked at.
@@ -65,10 +65,30 @@ struct Tally {
     handed: usize,
     hits: usize,
     fewer: usize,
+    /// Walks for any hit that a page at hand ended though one before it was missing.
+    blocked_past: usize,
+    /// Walks that cut the ray.
+    cut: usize,
+}
+
+/// The primitives of a page.
+fn ids(page: &PageView<'_>) -> Vec<u32> {
+    let blocks = page.triangles.iter().map(|block| block.id).chain(page.spheres.iter().map(|block| block.id));
+    let mut ids: Vec<_> = blocks.flatten().chain(page.cones.iter().map(|cone| cone.id)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
 }
 
 /// Every ray through `stores`, from the root on, at a store that has the page which the walk needs.
-fn check(name: &str, built: &Built, rays: &[(Ray, Candidate)], random: &mut Random, tally: &mut Tally) {
+fn check(
+    name: &str,
+    shapes: &Shapes,
+    built: &Built,
+    rays: &[(Ray, Candidate)],
+    random: &mut Random,
+    tally: &mut Tally,
+) {
     let (views, hang, seen) = (built.views(), hang(built), RefCell::new(Vec::new()));
     let resident = built.resident(&views);
     let share = |here| Share { all: &views, here, parents: &hang, seen: &seen };
@@ -80,6 +100,9 @@ fn check(name: &str, built: &Built, rays: &[(Ray, Candidate)], random: &mut Rand
         let owner = random.below(stores.len());
         stores[owner].here[page] = true;
     }
+    let of_page: Vec<_> = views.iter().map(ids).collect();
+    // The midpoint rule puts a primitive into several pages, not all of which a ray that hits it meets.
+    let stands_once = of_page.iter().map(Vec::len).sum::<usize>() == shapes.all.len();
     for (ray, expected) in rays {
         for kernels in [Kernels::Portable, Kernels::detect()] {
             let what = format!("{name} {kernels:?} {} stores {ray:?}", stores.len());
@@ -124,22 +147,39 @@ fn check(name: &str, built: &Built, rays: &[(Ray, Candidate)], random: &mut Rand
             tally.hits += usize::from(best.candidate.is_hit());
             tally.fewer += usize::from(visited.len() < full.len());
 
-            let mut from = FROM_ROOT;
+            let (mut from, mut carried) = (FROM_ROOT, *ray);
             let blocked = loop {
                 let with: Vec<_> =
-                    stores.iter().filter(|store| from == FROM_ROOT || store.here[from as usize]).collect();
-                let store = with[random.below(with.len())];
-                let walked =
-                    walk::<true>(kernels, resident.directory, store, ray, Hit::none(ray.t_max), from, &mut stack);
+                    (0..stores.len()).filter(|&at| from == FROM_ROOT || stores[at].here[from as usize]).collect();
+                let at = with[random.below(with.len())];
+                let (store, none) = (&stores[at], Hit::none(carried.t_max));
+                let walked = walk::<true>(kernels, resident.directory, store, &carried, none, from, &mut stack);
                 assert!(seen.borrow().len() <= views.len(), "{what}: on and on");
-                match walked.needs {
-                    None => break walked.best.candidate.is_hit(),
-                    Some(page) => {
-                        assert!(!walked.best.candidate.is_hit(), "{what}: a hit ends it");
-                        from = page;
-                    }
+                seen.take();
+                if from == FROM_ROOT {
+                    // Whatever is at hand and in the way is found, whichever pages are missing.
+                    let at_hand = of_page.iter().zip(&store.here).filter(|(_, here)| **here).flat_map(|(ids, _)| ids);
+                    let in_the_way = shapes.brute_force_of(&carried, at_hand.copied()).is_hit();
+                    let found = walked.best.candidate.is_hit();
+                    assert!(found == in_the_way || !stands_once && in_the_way, "{what}");
                 }
+                let Some(page) = walked.needs else { break walked.best.candidate.is_hit() };
+                assert!(!walked.best.candidate.is_hit() && !store.here[page as usize], "{what}: page {page}");
+                // Nothing that is in the way lies in what was cut off.
+                let end = walked.best.candidate.t;
+                assert!(end <= carried.t_max, "{what}: a ray that grows");
+                if end < carried.t_max {
+                    tally.cut += 1;
+                    carried.t_max = end;
+                    assert_eq!(shapes.brute_force(&carried).is_hit(), expected.is_hit(), "{what}: cut at {end}");
+                }
+                from = page;
             };
+            // The nearest hit would have had to wait for a page.
+            let (with, none) = (&stores[0], Hit::none(ray.t_max));
+            let any = walk::<true>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
+            let first = walk::<false>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
+            tally.blocked_past += usize::from(any.best.candidate.is_hit() && first.needs.is_some());
             seen.take();
             assert_eq!(blocked, expected.is_hit(), "{what}");
             assert_eq!(blocked, occluded(kernels, &resident, ray, &mut stack, &mut Counts::default()), "{what}");
@@ -162,13 +202,14 @@ fn walks_go_on_where_the_pages_are() {
                 let built = build(&shapes, rule, page_bytes).unwrap();
                 assert!(built.pages.len() > 5, "{} pages", built.pages.len());
                 let name = format!("seed {seed} {rule:?} {page_bytes}");
-                check(&name, &built, &rays, &mut Random(seed), &mut tally);
+                check(&name, &shapes, &built, &rays, &mut Random(seed), &mut tally);
             }
         }
     }
     println!("{tally:?}");
     // A walk that is handed on knows no less than one that is not: pages may be left out only if their order says so.
     assert!(tally.handed > 10_000 && tally.hits > 1000, "{tally:?}");
+    assert!(tally.cut > 200 && tally.blocked_past > 100, "{tally:?}");
 }
 
 #[test]
@@ -179,10 +220,50 @@ fn awkward_scenes_are_no_harder() {
         for rule in rules() {
             let built = build(&shapes, rule, 1200).unwrap();
             let name = format!("{name}, seed {seed} {rule:?}");
-            check(&name, &built, &rays, &mut Random(seed), &mut tally);
+            check(&name, &shapes, &built, &rays, &mut Random(seed), &mut tally);
         }
     }
     assert!(tally.handed > 1000 && tally.hits > 500, "{tally:?}");
+}
+
+/// Where rounding could make a cut too short: rays along axes and in the faces of pages' boxes, from and to their corners,
+/// in scenes a million times as large and as small.
+#[test]
+fn nothing_is_cut_off() {
+    let mut tally = Tally::default();
+    for (seed, scale) in (0..).zip([1.0, 1e6, 1e-6]) {
+        let shapes = Shapes::new(mixed(700, seed).into_iter().map(|shape| shape.scaled(scale)).collect());
+        for rule in rules() {
+            let built = build(&shapes, rule, 1024).unwrap();
+            let boxes: Vec<_> = built
+                .nodes
+                .iter()
+                .flat_map(|node| node.children().map(|(slot, child)| (node.aabb(slot), child)).collect::<Vec<_>>())
+                .filter_map(|(aabb, child)| matches!(child, Child::Page(_)).then_some(aabb))
+                .collect();
+            let mut random = Random(seed);
+            let rays: Vec<_> = (0..400)
+                .map(|i| {
+                    let (a, b) = (&boxes[random.below(boxes.len())], &boxes[random.below(boxes.len())]);
+                    let corner = |random: &mut Random, a: &Aabb| {
+                        Vec3::from_array(std::array::from_fn(|axis| [a.lo, a.hi][random.below(2)][axis]))
+                    };
+                    let origin = corner(&mut random, a);
+                    let mut direction = corner(&mut random, b) - origin;
+                    // Along a face of the first box; along one of its edges.
+                    (0..i % 3).for_each(|_| direction[random.below(3)] = 0.0);
+                    if direction == Vec3::ZERO {
+                        direction = Vec3::Y * scale;
+                    }
+                    let t_max = [1.0, f32::INFINITY][random.below(2)];
+                    let ray = Ray { origin, direction, t_min: 0.0, t_max };
+                    (ray, shapes.brute_force(&ray))
+                })
+                .collect();
+            check(&format!("scale {scale} {rule:?}"), &shapes, &built, &rays, &mut random, &mut tally);
+        }
+    }
+    assert!(tally.cut > 300 && tally.blocked_past > 100, "{tally:?}");
 }
 
 /// Pages that the directory does not lead to, or that there are not, or that the ray does not meet: the walk ends, and
@@ -258,6 +339,11 @@ fn walks_through_mutated_directories_end() {
         let (scene, ray) = (Resident { directory, pages: &store }, &rays[round % rays.len()].0);
         let from = random.below(views.len()) as u32;
         let (best, mut counts) = (Hit::none(ray.t_max), Counts::default());
+        let walk = Walk::<true, Share<'_>> { scene: &scene, ray, best, from, stack: &mut stack, counts: &mut counts };
+        let past = Kernels::detect().run(walk);
+        assert!(past.needs.is_none_or(|page| (page as usize) < views.len()), "round {round}");
+        assert!(counts.pages as usize <= 8 * nodes.len(), "round {round}: {counts:?}");
+        counts = Counts::default();
         let walk = Walk::<false, Share<'_>> { scene: &scene, ray, best, from, stack: &mut stack, counts: &mut counts };
         let walked = Kernels::detect().run(walk);
         assert!(walked.needs.is_none_or(|page| (page as usize) < views.len()), "round {round}");

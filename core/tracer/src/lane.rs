@@ -64,7 +64,8 @@ impl Walker<'_> {
     }
 
     /// Takes a shadow ray on from where it is: what of its weight arrives at the light, once that is known. Before that
-    /// `None`, and the record names the page that it needs.
+    /// `None`, and the record names the page that it needs; where nothing lets light through, it ends where all beyond is
+    /// known to be free ([`Walk`]).
     ///
     /// Behind transparent things it is a chain of nearest hits in order along the ray, each with its material's
     /// transmission, so that the product does not depend on the order of pages. A ray that meets more than
@@ -74,6 +75,7 @@ impl Walker<'_> {
         if !scene.transmits {
             let walked = self.walk::<true, P>(scene, &ray.ray(), Hit::none(ray.t_max), ray.page);
             let page = walked.needs.unwrap_or(ray.page);
+            ray.t_max = walked.best.candidate.t;
             ray.moved &= u8::from(ray.page == page);
             ray.page = page;
             let blocked = walked.best.candidate.is_hit();

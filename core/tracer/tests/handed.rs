@@ -106,6 +106,8 @@ struct Journeys {
     shadows: u64,
     settled: u64,
     behind_glass: u64,
+    /// Shadow rays of which a part was found free.
+    cut: u64,
 }
 
 /// Takes a ray on at a store, with all that it causes there; what needs another store comes back.
@@ -172,6 +174,7 @@ fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
             let is_shadow = ray.ray_kind() == RayKind::Shadow;
             journeys.shadows += u64::from(is_shadow);
             journeys.nearest += u64::from(!is_shadow);
+            journeys.cut += u64::from(is_shadow && ray.t_max < ray.t_end);
             // Over the wire, in the record that it has there.
             let compact = is_shadow && !scene.transmits;
             waiting.push(if compact { RayRecord::from(&ShadowRecord::from(&ray)) } else { ray });
@@ -195,6 +198,7 @@ fn check_world(world: &World, transmits: bool) {
     println!("{journeys:?}");
     assert!(journeys.nearest > 1000 && journeys.shadows > 1000 && journeys.settled > 100, "{journeys:?}");
     assert_eq!(journeys.behind_glass > 100, transmits, "{journeys:?}");
+    assert!(transmits || journeys.cut > 100, "{journeys:?}");
 }
 
 #[test]

@@ -42,6 +42,21 @@ pub enum Shape {
     Cone(Cone),
 }
 
+impl Shape {
+    pub fn scaled(self, by: f32) -> Self {
+        match self {
+            Self::Triangle(t) => Self::Triangle(Triangle { v: t.v.map(|v| v * by) }),
+            Self::Sphere(s) => Self::Sphere(Sphere { centre: s.centre * by, radius: s.radius * by }),
+            Self::Cone(c) => Self::Cone(Cone {
+                base: c.base * by,
+                base_radius: c.base_radius * by,
+                apex: c.apex * by,
+                apex_radius: c.apex_radius * by,
+            }),
+        }
+    }
+}
+
 /// A caller's primitives: the id is the index.
 #[derive(Clone, Debug, Default)]
 pub struct Shapes {
@@ -71,12 +86,17 @@ impl Shapes {
 
     /// The nearest hit by testing every primitive.
     pub fn brute_force(&self, ray: &Ray) -> Candidate {
+        self.brute_force_of(ray, 0..self.all.len() as u32)
+    }
+
+    /// The nearest hit by testing these primitives.
+    pub fn brute_force_of(&self, ray: &Ray, ids: impl Iterator<Item = u32>) -> Candidate {
         let kernel = RayKernel::new(ray);
-        self.all.iter().enumerate().fold(Candidate::none(ray.t_max), |best, (id, shape)| {
-            let hit = match shape {
-                Shape::Triangle(t) => t.hit(&kernel, id as u32, &best),
-                Shape::Sphere(s) => s.hit(&kernel, id as u32, &best),
-                Shape::Cone(c) => c.hit(&kernel, id as u32, &best),
+        ids.fold(Candidate::none(ray.t_max), |best, id| {
+            let hit = match &self.all[id as usize] {
+                Shape::Triangle(t) => t.hit(&kernel, id, &best),
+                Shape::Sphere(s) => s.hit(&kernel, id, &best),
+                Shape::Cone(c) => c.hit(&kernel, id, &best),
             };
             hit.unwrap_or(best)
         })
