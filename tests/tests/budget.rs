@@ -3,6 +3,7 @@
 
 use hybray::build;
 use hybray::model;
+use hybray::partition::light_caches;
 use hybray::prepare::Prepared;
 use hybray_native::{Budget, DispatcherAt, Farm, plan, trace, trace_within};
 use hybray_scheduler::policy::Policy;
@@ -14,8 +15,9 @@ use hybray_wire::Counts;
 /// Bytes of a line of memory: budgets are counted in them.
 const LINE: u64 = 64;
 
-/// Draws a scene on farms with every policy, and with the least memory that will do and half as much again.
-fn check(name: &str, page_bytes: usize, samples: u32) {
+/// Draws a scene on farms with every policy, and with the least memory that will do and half as much again. Returns how many
+/// pages were in light caches.
+fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
     let prepared = Prepared::new(scene(name), &build::Settings { page_bytes, ..build::Settings::default() })
         .unwrap_or_else(|e| panic!("{name}: {e}"));
     let opened = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -29,6 +31,7 @@ fn check(name: &str, page_bytes: usize, samples: u32) {
         trace(&scene, prepared.hash, &frame, &farm(1, DispatcherAt::Host), &mut |_| true).expect("a picture");
     let seed = name.bytes().fold(page_bytes as u64, |seed, byte| seed.wrapping_mul(31) + u64::from(byte));
     let random = &mut Random(seed);
+    let mut light_pages = 0;
     for nodes in [1, 2, 3, 7] {
         let owners: Vec<u16> = pages.iter().map(|_| random.below(nodes) as u16 + 1).collect();
         let nodes = nodes as u16;
@@ -38,9 +41,21 @@ fn check(name: &str, page_bytes: usize, samples: u32) {
                 let dispatcher = [DispatcherAt::Host, DispatcherAt::Node][random.below(2)];
                 let steps = [16, 4096][random.below(2)];
                 let settings = Settings { policy, steps, ..Settings::default() };
-                let budget = Budget { memory, owners: &owners, pages: &pages, settings };
-                let what =
-                    || format!("{name}, seed {seed}, {nodes} nodes, {dispatcher:?}, {memory} bytes, {settings:?}");
+                let plan = planned(&scene, &owners, nodes, memory, policy).expect("it is enough");
+                let room = plan.light_cache_room(memory);
+                let asked = [None, Some(0), Some(room / 2), Some(room)][random.below(4)];
+                let (plan, caches) = light_caches(plan, memory, asked, policy, &scene, &owners, nodes).expect("room");
+                assert!(plan.sum().total_bytes() <= memory, "{plan:?}");
+                light_pages += caches.pages.iter().map(Vec::len).sum::<usize>();
+                let (pages, light_cache) = (&pages, &caches.pages);
+                let budget = Budget { memory, owners: &owners, pages, light_cache, settings };
+                let what = || {
+                    let lights = caches.bytes;
+                    format!(
+                        "{name}, seed {seed}, {nodes} nodes, {dispatcher:?}, {memory} bytes, {lights} of them in \
+                             light caches, {settings:?}"
+                    )
+                };
                 let traced = within(60, what, || {
                     let farm = farm(nodes, dispatcher);
                     trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut |_| true)
@@ -58,6 +73,7 @@ fn check(name: &str, page_bytes: usize, samples: u32) {
             }
         }
     }
+    light_pages
 }
 
 fn counts(nodes: &[hybray_scheduler::NodeReport]) -> Counts {
@@ -66,24 +82,30 @@ fn counts(nodes: &[hybray_scheduler::NodeReport]) -> Counts {
     counts
 }
 
-/// The least memory that will do, as the refusal of less says.
-fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+/// The plan of nodes that own what `owners` says.
+fn planned(scene: &Scene<'_>, owners: &[u16], nodes: u16, memory: u64, policy: Policy) -> Result<Plan, PlanError> {
     let mut entries = scene.resident.directory.entries.to_vec();
     entries.iter_mut().zip(owners).for_each(|(entry, &owner)| entry.owner = owner);
     let mut owned = *scene;
     owned.resident.directory.entries = &entries;
-    let least = needed(plan(&owned, nodes, 0, policy)).expect("nothing is too little");
-    let fits = plan(&owned, nodes, least, policy).unwrap_or_else(|e| panic!("{nodes} nodes: {e}"));
+    plan(&owned, nodes, memory, policy)
+}
+
+/// The least memory that will do, as the refusal of less says.
+fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+    let plan = |memory| planned(scene, owners, nodes, memory, policy);
+    let least = needed(plan(0)).expect("nothing is too little");
+    let fits = plan(least).unwrap_or_else(|e| panic!("{nodes} nodes: {e}"));
     assert!(fits.sum().total_bytes() <= least, "{fits:?}");
-    assert_eq!(needed(plan(&owned, nodes, least - LINE, policy)), Some(least), "{nodes} nodes");
-    assert_eq!(needed(plan(&owned, nodes, least / 2, policy)), Some(least), "{nodes} nodes");
+    assert_eq!(needed(plan(least - LINE)), Some(least), "{nodes} nodes");
+    assert_eq!(needed(plan(least / 2)), Some(least), "{nodes} nodes");
     least
 }
 
 fn needed(plan: Result<Plan, PlanError>) -> Option<u64> {
     match plan {
         Err(PlanError::Memory { needed } | PlanError::Pages { needed }) => Some(needed),
-        Ok(_) => None,
+        Ok(_) | Err(PlanError::LightCache { .. }) => None,
     }
 }
 
@@ -95,8 +117,8 @@ fn balls() {
 
 #[test]
 fn glass() {
-    check("spd:teapot:3", 4096, 1);
-    check("spd:teapot:3", 16_384, 1);
+    let light_pages = check("spd:teapot:3", 4096, 1) + check("spd:teapot:3", 16_384, 1);
+    assert!(light_pages > 100, "{light_pages} pages in light caches");
 }
 
 #[test]
@@ -107,8 +129,8 @@ fn mirrors() {
 
 #[test]
 fn meshes_without_end() {
-    check("organic:2000", 4096, 1);
-    check("organic:2000", 16_384, 1);
+    let light_pages = check("organic:2000", 4096, 1) + check("organic:2000", 16_384, 1);
+    assert!(light_pages > 100, "{light_pages} pages in light caches");
 }
 
 #[test]
@@ -136,13 +158,26 @@ fn a_refusal_says_what_would_do() {
         let plan = |nodes, memory| Plan::new(sizes, nodes, memory, None, policy);
         let what = format!("round {round}: {sizes:?}, {nodes} nodes of {memory} bytes, {policy:?}");
         match plan(nodes, memory) {
-            Ok(plan) => assert!(plan.sum().total_bytes() <= memory, "{what}: {plan:?}"),
+            Ok(plan) => {
+                assert!(plan.sum().total_bytes() <= memory, "{what}: {plan:?}");
+                let room = plan.light_cache_room(memory);
+                let all = plan.with_light_cache(room, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
+                assert!(all.sum().total_bytes() <= memory, "{what}: {all:?}");
+                let more = plan.with_light_cache(room + LINE, memory);
+                let refused = Err(PlanError::LightCache { bytes: room + LINE, room });
+                assert!(more == refused || plan.holds_all && more == Ok(plan), "{what}: {more:?}");
+                let some = LINE * (random.bits() % (room / LINE + 1));
+                let some = plan.with_light_cache(some, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
+                assert!(some.sum().total_bytes() <= memory && some.places <= plan.places, "{what}: {some:?}");
+                assert!(plan.holds_all || some.fixed_bytes() == plan.fixed_bytes() + 64 * some.light_lines as u64);
+            }
             Err(error) => {
                 let needed = needed(Err(error)).expect("a refusal");
                 let fits = plan(nodes, needed).unwrap_or_else(|e| panic!("{what}: {needed} should do: {e}"));
                 assert!(fits.sum().total_bytes() <= needed, "{what}: {fits:?}");
                 assert!(plan(nodes, needed - LINE).is_err(), "{what}: less than {needed} does too");
                 match error {
+                    PlanError::LightCache { .. } => panic!("{what}: nobody asked for one"),
                     PlanError::Memory { .. } => not_even_a_node += 1,
                     PlanError::Pages { .. } => too_few += 1,
                 }

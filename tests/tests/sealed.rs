@@ -46,7 +46,7 @@ fn drawn(name: &str, nodes: u16, settings: Settings, stranger: Option<Stranger<'
     let all = peers as u16 - 1;
     let least = match plan(&scene, all, 0, settings.policy) {
         Err(PlanError::Memory { needed } | PlanError::Pages { needed }) => needed,
-        Ok(plan) => panic!("nothing is enough: {plan:?}"),
+        plan => panic!("nothing is enough: {plan:?}"),
     };
     let plan = plan(&scene, all, least, settings.policy).expect("what is needed");
 

@@ -6,11 +6,11 @@
 
 use hybray::build;
 use hybray::model;
-use hybray::partition::{Voxels, owners};
+use hybray::partition::{LightCaches, Voxels, light_caches, owners};
 use hybray::prepare::Prepared;
 use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
 use hybray_scheduler::policy::{LinkCost, Policy};
-use hybray_scheduler::{Options, Outcome, PlanError, Settings};
+use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
     Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_spoiled,
 };
@@ -83,8 +83,8 @@ struct Draw {
     dispatcher: u16,
     settings: Settings,
     options: Options,
-    /// Bytes, and who owns which page; every node has everything if there are none.
-    budget: Option<(u64, Vec<u16>)>,
+    /// Bytes, who owns which page, and light caches; every node has everything if there are none.
+    budget: Option<(u64, Vec<u16>, LightCaches)>,
     delays: Option<(u64, u64)>,
     faults: Vec<Fault>,
 }
@@ -113,14 +113,18 @@ fn network(random: &mut Random, nodes: u16, machine: &Machine) -> NetworkModel {
 }
 
 /// The least memory that will do.
-fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+fn planned(scene: &Scene<'_>, owners: &[u16], nodes: u16, memory: u64, policy: Policy) -> Result<Plan, PlanError> {
     let mut entries = scene.resident.directory.entries.to_vec();
     entries.iter_mut().zip(owners).for_each(|(entry, &owner)| entry.owner = owner);
     let mut owned = *scene;
     owned.resident.directory.entries = &entries;
-    match plan(&owned, nodes, 0, policy) {
+    plan(&owned, nodes, memory, policy)
+}
+
+fn least(scene: &Scene<'_>, owners: &[u16], nodes: u16, policy: Policy) -> u64 {
+    match planned(scene, owners, nodes, 0, policy) {
         Err(PlanError::Memory { needed } | PlanError::Pages { needed }) => needed,
-        Ok(plan) => panic!("nothing is enough: {plan:?}"),
+        plan => panic!("nothing is enough: {plan:?}"),
     }
 }
 
@@ -161,7 +165,13 @@ impl Draw {
         draw
     }
 
-    fn budget(random: &mut Random, drawn: &Drawn, scene: &Scene<'_>, nodes: u16, policy: Policy) -> (u64, Vec<u16>) {
+    fn budget(
+        random: &mut Random,
+        drawn: &Drawn,
+        scene: &Scene<'_>,
+        nodes: u16,
+        policy: Policy,
+    ) -> (u64, Vec<u16>, LightCaches) {
         let count = drawn.prepared.packed.pages();
         let any = |random: &mut Random| 1 + random.below(usize::from(nodes)) as u16;
         let only = any(random);
@@ -175,7 +185,12 @@ impl Draw {
             _ => (0..count).map(|_| any(random)).collect(),
         };
         let least = least(scene, &owners, nodes, policy);
-        (least + least * one_of(random, &[0, 0, 0, 1, 4, 16]) / 16, owners)
+        let memory = least + least * one_of(random, &[0, 0, 0, 1, 4, 16]) / 16;
+        let plan = planned(scene, &owners, nodes, memory, policy).expect("it is enough");
+        let room = plan.light_cache_room(memory);
+        let asked = one_of(random, &[None, Some(0), Some(room / 2), Some(room)]);
+        let (_, caches) = light_caches(plan, memory, asked, policy, scene, &owners, nodes).expect("there is room");
+        (memory, owners, caches)
     }
 
     /// Faults at moments of the picture: most take as long as it does, or are over before it begins.
@@ -204,7 +219,12 @@ impl Draw {
     }
 
     fn run(&self, drawn: &Drawn, scene: &Scene<'_>, pages: &[&[u8]], frame: &Frame) -> Simulated {
-        let budget = self.budget.as_ref().map(|(memory, owners)| Budget { memory: *memory, page_memory: None, owners });
+        let budget = self.budget.as_ref().map(|(memory, owners, caches)| Budget {
+            memory: *memory,
+            page_memory: None,
+            owners,
+            light_cache: &caches.pages,
+        });
         let Self { nodes, dispatcher, options, settings, .. } = *self;
         let farm = Farm { machine: &self.machine, nodes, dispatcher, options, settings, budget };
         let spoil = &mut |network: &mut Network| {
@@ -305,7 +325,7 @@ fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts, closeness:
         assert_eq!(node.exchange.nonsense, 0, "node {}", number + 1);
     }
     closeness.look(run, draw);
-    if let Some((memory, _)) = draw.budget {
+    if let Some((memory, ..)) = draw.budget {
         assert!(run.plan.sum().total_bytes() <= memory, "over budget: {:?}", run.plan);
     }
     if !lost {

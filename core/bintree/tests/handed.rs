@@ -49,7 +49,8 @@ fn walk<const ANY: bool>(
     stack: &mut Stack,
 ) -> Walked {
     let (scene, mut counts) = (Resident { directory, pages }, Counts::default());
-    let walked = kernels.run(Walk::<ANY, Share<'_>> { scene: &scene, ray, best, from, stack, counts: &mut counts });
+    let walked =
+        kernels.run(Walk::<ANY, Share<'_>> { scene: &scene, ray, best, from, past: true, stack, counts: &mut counts });
     assert!(counts.pages as usize <= pages.all.len());
     walked
 }
@@ -339,12 +340,28 @@ fn walks_through_mutated_directories_end() {
         let (scene, ray) = (Resident { directory, pages: &store }, &rays[round % rays.len()].0);
         let from = random.below(views.len()) as u32;
         let (best, mut counts) = (Hit::none(ray.t_max), Counts::default());
-        let walk = Walk::<true, Share<'_>> { scene: &scene, ray, best, from, stack: &mut stack, counts: &mut counts };
+        let walk = Walk::<true, Share<'_>> {
+            scene: &scene,
+            ray,
+            best,
+            from,
+            past: true,
+            stack: &mut stack,
+            counts: &mut counts,
+        };
         let past = Kernels::detect().run(walk);
         assert!(past.needs.is_none_or(|page| (page as usize) < views.len()), "round {round}");
         assert!(counts.pages as usize <= 8 * nodes.len(), "round {round}: {counts:?}");
         counts = Counts::default();
-        let walk = Walk::<false, Share<'_>> { scene: &scene, ray, best, from, stack: &mut stack, counts: &mut counts };
+        let walk = Walk::<false, Share<'_>> {
+            scene: &scene,
+            ray,
+            best,
+            from,
+            past: true,
+            stack: &mut stack,
+            counts: &mut counts,
+        };
         let walked = Kernels::detect().run(walk);
         assert!(walked.needs.is_none_or(|page| (page as usize) < views.len()), "round {round}");
         assert!(counts.pages as usize <= 8 * nodes.len(), "round {round}: {counts:?}");

@@ -83,7 +83,15 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                         there = !there;
                         let scene = if there { &elsewhere } else { &scene };
                         let (best, stack, counts) = (walked.best, &mut stack, &mut counts);
-                        walked = kernels.run(Walk::<false, Share<'_>> { scene, ray, best, from, stack, counts });
+                        walked = kernels.run(Walk::<false, Share<'_>> {
+                            scene,
+                            ray,
+                            best,
+                            from,
+                            past: false,
+                            stack,
+                            counts,
+                        });
                         hops += 1;
                         assert!(hops <= views.len(), "{what}: on and on");
                     }

@@ -60,6 +60,14 @@ pub enum PlanError {
         /// The least that would do.
         needed: u64,
     },
+    /// There is no room for as large a light cache.
+    #[error("a light cache of {bytes} bytes is too large: {room} bytes or less would do")]
+    LightCache {
+        /// What it would take.
+        bytes: u64,
+        /// What there is, beside the node's own pages and the least of a cache.
+        room: u64,
+    },
 }
 
 /// Places of the cache at least: one, and the lane's.
@@ -74,6 +82,13 @@ fn even_share(sizes: &Sizes, nodes: u16) -> u64 {
     (sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64).min(sizes.pages_bytes)
 }
 
+/// What the largest of these light caches takes, bytes in whole lines: each is a list of pages.
+#[must_use]
+pub fn light_cache_bytes(entries: &[PageEntry], caches: &[impl AsRef<[u32]>]) -> u64 {
+    let bytes = |&page: &u32| (lines_for(entries[page as usize].bytes as usize) * size_of::<Line>()) as u64;
+    caches.iter().map(|pages| pages.as_ref().iter().map(bytes).sum()).max().unwrap_or(0)
+}
+
 /// What a node is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -85,6 +100,8 @@ pub struct Plan {
     pub places: usize,
     /// Lines for pages: the cache's first, then those of pages that stay.
     pub lines: usize,
+    /// How many of them are for pages between the node's own and the lights, which stay, too.
+    pub light_lines: usize,
     /// Whether the node has room for every page.
     pub holds_all: bool,
 }
@@ -127,9 +144,8 @@ impl Plan {
             plan.lines = PLACES_MIN * place_lines + (sizes.pages_bytes / line) as usize;
         } else {
             let free = room - owned;
-            let place = place_lines as u64 * line + size_of::<CachePlace>() as u64 + 64;
             if policy != Policy::DataParallel {
-                plan.places = PLACES_MIN + ((free / place) as usize).min(sizes.pages);
+                plan.places = PLACES_MIN + ((free / plan.place_bytes()) as usize).min(sizes.pages);
             }
             plan.lines = plan.places * place_lines + (owned / line) as usize;
         }
@@ -149,11 +165,52 @@ impl Plan {
             partials: share(PARTIALS, 44),
         };
         let lines = PLACES_MIN * lines_for(sizes.page_bytes_max);
-        Self { sizes, limits, places: PLACES_MIN, lines, holds_all: false }
+        Self { sizes, limits, places: PLACES_MIN, lines, light_lines: 0, holds_all: false }
     }
 
     fn least_bytes(&self) -> u64 {
         self.sum().total_bytes()
+    }
+
+    /// What a place of the cache takes at most.
+    fn place_bytes(&self) -> u64 {
+        (lines_for(self.sizes.page_bytes_max) * size_of::<Line>() + size_of::<CachePlace>() + size_of::<Line>()) as u64
+    }
+
+    /// The same with its cache made smaller or larger, to `places`.
+    fn with_places(mut self, places: usize) -> Self {
+        let place_lines = lines_for(self.sizes.page_bytes_max);
+        self.lines = self.lines - self.places * place_lines + places * place_lines;
+        self.places = places;
+        self
+    }
+
+    /// Bytes that a light cache could have of a budget of `memory`, if the cache had no more than it must. 0 where every page
+    /// is at hand.
+    #[must_use]
+    pub fn light_cache_room(&self, memory: u64) -> u64 {
+        if self.holds_all {
+            return 0;
+        }
+        let line = size_of::<Line>() as u64;
+        memory.saturating_sub(self.with_places(PLACES_MIN).sum().total_bytes()) / line * line
+    }
+
+    /// The same with `bytes`, in whole lines, for pages between the node's own and the lights: its cache gets the smaller.
+    ///
+    /// # Errors
+    /// If a budget of `memory` has no room for it. Where every page is at hand it takes nothing, and none is wanted.
+    pub fn with_light_cache(self, bytes: u64, memory: u64) -> Result<Self, PlanError> {
+        if bytes == 0 || self.holds_all {
+            return Ok(self);
+        }
+        let room = self.light_cache_room(memory);
+        let Some(rest) = room.checked_sub(bytes) else { return Err(PlanError::LightCache { bytes, room }) };
+        let places = PLACES_MIN + (rest / self.place_bytes()) as usize;
+        let mut plan = self.with_places(places.min(self.places));
+        plan.light_lines = bytes as usize / size_of::<Line>();
+        plan.lines += plan.light_lines;
+        Ok(plan)
     }
 
     /// The same with no more than `bytes` for pages: what the node owns, at most `owned_max`, and the least of a cache stay,
@@ -177,7 +234,7 @@ impl Plan {
     pub fn without_budget(sizes: Sizes) -> Self {
         let limits = Limits { pages: 0, ..Limits::all_at_hand() };
         let lines = sizes.pages_bytes as usize / size_of::<Line>();
-        Self { sizes, limits, places: 0, lines, holds_all: true }
+        Self { sizes, limits, places: 0, lines, light_lines: 0, holds_all: true }
     }
 
     /// Bytes of pages, rounded up to lines, that a node may own or be given for good.
@@ -206,7 +263,8 @@ impl Plan {
         sum.add::<Material>("materials", s.materials);
         sum.add::<Light>("lights", s.lights);
         sum.add::<CachePlace>("places of the cache", self.places);
-        sum.add::<Line>("pages", self.lines);
+        sum.add::<Line>("pages", self.lines - self.light_lines);
+        sum.add::<Line>("pages towards lights", self.light_lines);
         sum
     }
 
@@ -274,6 +332,7 @@ impl Plan {
     /// Settings that go with this plan.
     #[must_use]
     pub fn settings(&self, settings: Settings) -> Settings {
-        Settings { in_system: settings.in_system.min(self.limits.rays as u32 / 2), ..settings }
+        let lights_first = settings.lights_first || self.light_lines > 0;
+        Settings { in_system: settings.in_system.min(self.limits.rays as u32 / 2), lights_first, ..settings }
     }
 }

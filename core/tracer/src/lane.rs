@@ -22,6 +22,8 @@ pub trait Sink {
 pub struct Walker<'s> {
     /// Which kernels the processor can run.
     pub kernels: Kernels,
+    /// Whether shadow rays are tested against all pages at hand first ([`Walk::past`]).
+    pub past: bool,
     /// Scratch of walks.
     pub stack: &'s mut Stack,
     /// Nodes, blocks and pages.
@@ -38,7 +40,15 @@ impl Walker<'_> {
     ) -> Walked {
         let resident = &scene.resident;
         let stack = &mut *self.stack;
-        self.kernels.run(Walk::<ANY, P> { scene: resident, ray, best, from, stack, counts: &mut self.counts })
+        self.kernels.run(Walk::<ANY, P> {
+            scene: resident,
+            ray,
+            best,
+            from,
+            past: self.past,
+            stack,
+            counts: &mut self.counts,
+        })
     }
 
     /// Takes a nearest-hit ray on from where it is. Its nearest hit, or none to its end, once that is known and the page

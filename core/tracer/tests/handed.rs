@@ -120,7 +120,7 @@ fn trace<P: Pages + ?Sized>(
     back: &mut Vec<RayRecord>,
 ) {
     let (mut stack, mut room) = (Stack::new(), [HitRecord::EMPTY; 5]);
-    let mut walker = Walker { kernels, stack: &mut stack, counts: Default::default() };
+    let mut walker = Walker { kernels, past: true, stack: &mut stack, counts: Default::default() };
     let mut lane = Lane::new(&mut room);
     back.extend(lane.take(scene, &mut walker, ray, film, counts));
     while !lane.is_empty() {

@@ -41,7 +41,7 @@ impl Record {
 const ORIGIN: Origin = Origin { tile: 5, epoch: 2, home: 3, pixel: 61 };
 
 fn walker(stack: &mut Stack) -> Walker<'_> {
-    Walker { kernels: Kernels::Portable, stack, counts: Default::default() }
+    Walker { kernels: Kernels::Portable, past: false, stack, counts: Default::default() }
 }
 
 fn primary(origin: Vec3, direction: Vec3, id: u64) -> RayRecord {

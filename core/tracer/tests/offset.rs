@@ -49,7 +49,8 @@ fn check(name: &str, rounds: usize, both_sides: bool, mut make: impl FnMut(&mut 
         let direction = (target - origin) / (target - origin).length();
         World::new(vec![(shape, 0)], vec![Material::MATT], vec![]).with(|scene| {
             let mut stack = Stack::new();
-            let mut walker = Walker { kernels: Kernels::Portable, stack: &mut stack, counts: Default::default() };
+            let mut walker =
+                Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
             let mut record = RayRecord {
                 origin: origin.to_array(),
                 direction: direction.to_array(),

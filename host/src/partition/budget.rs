@@ -4,10 +4,12 @@
 //! enough to say which figure is the least that does. Memory is in bytes.
 
 use super::owners::first_between;
-use super::{Misfit, PlacedPage, owners};
+use super::owners::owned_bytes;
+use super::{LightCaches, Misfit, PlacedPage, light_caches, owners};
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{Plan, PlanError, Sizes};
+use hybray_tracer::Scene;
 
 /// Places that a node's page memory has at least, if [`page_bytes_for`] can see to it.
 pub const PLACES: u64 = 32;
@@ -57,6 +59,21 @@ pub struct Fit {
     pub owned_bytes: Vec<u64>,
     /// What every node is made of.
     pub plan: Plan,
+    /// What each node has towards the lights.
+    pub light_caches: LightCaches,
+}
+
+impl Fit {
+    /// The same with light caches of `bytes`, or such as the policy has ([`light_caches`]).
+    ///
+    /// # Errors
+    /// If there is no room for as many as were asked for.
+    pub fn with_light_caches(self, wanted: &Wanted, bytes: Option<u64>, scene: &Scene<'_>) -> Result<Self, PlanError> {
+        let memory = wanted.page_memory.map_or(wanted.memory, |_| self.plan.sum().total_bytes());
+        let (plan, light_caches) =
+            light_caches(self.plan, memory, bytes, wanted.policy, scene, &self.owners, wanted.nodes)?;
+        Ok(Self { plan, light_caches, ..self })
+    }
 }
 
 /// Why it does not.
@@ -71,7 +88,7 @@ pub enum NoFit {
 }
 
 impl Wanted {
-    /// Finds owners and the plan.
+    /// Finds owners and the plan, without light caches ([`light_caches`](super::light_caches)).
     ///
     /// # Errors
     /// If the budget is too small.
@@ -80,12 +97,9 @@ impl Wanted {
     /// If there are no nodes, or a page's voxel is not below `voxels`.
     pub fn fit(&self, pages: &[PlacedPage], voxels: u32) -> Result<Fit, NoFit> {
         let owners = owners(pages, voxels, self.nodes, self.plan(None)?.owned_bytes_max())?;
-        let mut owned_bytes = vec![0; usize::from(self.nodes)];
-        for (page, &owner) in pages.iter().zip(&owners) {
-            owned_bytes[usize::from(owner) - 1] += u64::from(page.bytes);
-        }
+        let owned_bytes = owned_bytes(pages, &owners, self.nodes);
         let plan = self.plan(owned_bytes.iter().max().copied())?;
-        Ok(Fit { owners, owned_bytes, plan })
+        Ok(Fit { owners, owned_bytes, plan, light_caches: LightCaches::default() })
     }
 
     /// Whole KiB for each of so many nodes that do, such that one KiB less does not; `None` if a TiB does not.

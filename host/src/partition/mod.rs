@@ -4,12 +4,14 @@
 //! internal unit, memory in bytes.
 
 mod budget;
+mod light_cache;
 mod owners;
 mod pilot;
 mod placement;
 mod voxels;
 
 pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
+pub use light_cache::{LightCaches, light_caches};
 pub use owners::{Misfit, PlacedPage, owners};
 pub use pilot::{Parts, Pilot};
 pub use placement::{Placement, place};

@@ -63,6 +63,16 @@ pub fn owners(pages: &[PlacedPage], voxels: u32, nodes: u16, memory: u64) -> Res
     Err(Misfit { bytes, nodes, memory, memory_enough, nodes_enough })
 }
 
+/// Bytes of pages that each of `nodes` owns, node 1's first.
+#[must_use]
+pub fn owned_bytes(pages: &[PlacedPage], owners: &[u16], nodes: u16) -> Vec<u64> {
+    let mut owned = vec![0; usize::from(nodes)];
+    for (page, &owner) in pages.iter().zip(owners) {
+        owned[usize::from(owner) - 1] += u64::from(page.bytes);
+    }
+    owned
+}
+
 /// A number above `fails` up to `does` that does, while the one before it fails (or is `fails`).
 pub(super) fn first_between(mut fails: u64, mut does: u64, holds: impl Fn(u64) -> bool) -> u64 {
     while does - fails > 1 {

@@ -88,7 +88,8 @@ impl Pilot {
         let watched = Watched { pages: scene.resident.pages, opened: RefCell::default() };
         let scene = scene.at_hand(&watched);
         let (mut stack, mut records) = (Stack::new(), vec![HitRecord::EMPTY; depth_max + 1]);
-        let mut walker = Walker { kernels: Kernels::Portable, stack: &mut stack, counts: Default::default() };
+        let mut walker =
+            Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
         let mut counts = Counts::default();
         let step = tiles.div_ceil(RAYS_MAX);
         let places = &PLACES[..((RAYS_MAX / tiles.max(1)).clamp(1, 4)) as usize];

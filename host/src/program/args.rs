@@ -109,6 +109,15 @@ pub(super) struct WorkArgs {
     pub pyramid: Option<u8>,
 }
 
+/// What of a node's memory is for shadow rays.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct LightArgs {
+    /// Memory of each node for pages between its own and the lights, such as 4MiB, at most (the 1995 report's light caches): they
+    /// are there from the start and stay. Default: with hybrid-1995 all, if they fit in half of what is left; else 0: none
+    #[arg(long, value_name = "BYTES", value_parser = bytes_or_none, help_heading = BUDGET)]
+    pub light_cache: Option<u64>,
+}
+
 impl WorkArgs {
     /// `settings` with what was asked for.
     pub fn settings(&self, settings: NodeSettings) -> NodeSettings {
@@ -225,6 +234,8 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub work: WorkArgs,
     #[command(flatten)]
+    pub light: LightArgs,
+    #[command(flatten)]
     pub tree: TreeArgs,
 }
 
@@ -247,6 +258,8 @@ pub(super) struct PlanArgs {
     /// The machine that nodes are simulated on: how long it is at most until a ray ends there
     #[arg(long, value_name = "NAME", value_parser = machine())]
     pub machine: Option<&'static Machine>,
+    #[command(flatten)]
+    pub light: LightArgs,
     /// Write the plan in JSON to this file, or to standard output (`-`) instead of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -303,6 +316,8 @@ pub(super) struct SimulateArgs {
     pub scheduler: Vec<Policy>,
     #[command(flatten)]
     pub work: WorkArgs,
+    #[command(flatten)]
+    pub light: LightArgs,
     /// Columns and rows, pixels
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
@@ -454,6 +469,11 @@ fn page_memory(text: &str) -> Result<PageMemory, String> {
         }
         None => bytes(text).map(PageMemory::Bytes).map_err(|_| wanted()),
     }
+}
+
+/// Bytes, or 0.
+fn bytes_or_none(text: &str) -> Result<u64, String> {
+    if text == "0" { Ok(0) } else { bytes(text) }
 }
 
 fn number(text: &str, what: &str, holds: impl Fn(f32) -> bool) -> Result<f32, String> {

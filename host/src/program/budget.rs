@@ -8,6 +8,8 @@ use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{PlanError, Sizes};
 use hybray_tracer::Scene;
 
+const KIB: u64 = 1024;
+
 /// A farm of nodes with a budget, before it is known whether a scene fits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Farm<'a> {
@@ -17,6 +19,8 @@ pub(super) struct Farm<'a> {
     /// What of it is for pages at most, bytes.
     pub page_memory: Option<u64>,
     pub policy: Policy,
+    /// For light caches, bytes; as the policy has it if it is not given.
+    pub light_cache: Option<u64>,
     /// Nodes that the command can have.
     pub nodes_most: u16,
     pub tree: &'a TreeArgs,
@@ -41,7 +45,7 @@ impl Farm<'_> {
     pub fn fit(&self, prepared: &Prepared, scene: &Scene<'_>) -> Result<Fit> {
         let wanted = self.wanted(scene);
         match wanted.fit(&prepared.packed.placed_pages(), prepared.packed.voxels()) {
-            Ok(fit) => Ok(fit),
+            Ok(fit) => self.with_light_caches(fit, &wanted, scene),
             Err(NoFit::Plan(PlanError::Memory { .. })) => {
                 bail!(
                     "{} is less than each of {} needs for this scene: {}",
@@ -57,6 +61,23 @@ impl Farm<'_> {
                 memory(self.memory),
                 self.remedies(&wanted)
             ),
+        }
+    }
+
+    fn with_light_caches(&self, fit: Fit, wanted: &Wanted, scene: &Scene<'_>) -> Result<Fit> {
+        match fit.with_light_caches(wanted, self.light_cache, scene) {
+            Ok(fit) => Ok(fit),
+            Err(PlanError::LightCache { bytes, room }) => {
+                let room = if room < KIB { room } else { room / KIB * KIB };
+                bail!(
+                    "--light-cache {} wants {bytes} bytes of pages, too many beside what else each node has with {}: \
+                     give --light-cache {}",
+                    size(self.light_cache.unwrap_or(bytes)),
+                    memory(self.memory),
+                    size(room)
+                )
+            }
+            Err(error) => Err(error.into()),
         }
     }
 

@@ -111,6 +111,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
         memory: args.memory,
         page_memory: args.page_memory.map(|page_memory| page_memory.bytes(sizes.pages_bytes)),
         policy: args.scheduler,
+        light_cache: args.light.light_cache,
         nodes_most: NODES_MAX,
         tree: &args.tree,
         packed: is_packed(&args.scene.scene),
@@ -132,7 +133,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
         page_bytes: sizes.pages_bytes,
         page_bytes_max: sizes.page_bytes_max,
         voxels: prepared.packed.voxels(),
-        plan: PlanReport::of(&fit),
+        plan: PlanReport::of(&fit, sizes.lights),
         least_memory: least.memory,
         least_nodes: least.nodes,
         progress: progress.as_ref().map(Bounds::report),
@@ -188,6 +189,13 @@ fn table(report: &Report<'_>, fit: &Fit, farm: &Farm<'_>, least: Least) -> Strin
         format!("has a cache of {places} place{} for others", s(places as u64))
     };
     line(format_args!("each node  owns {least_owned} to {most_owned} bytes of pages, and {holds}"));
+    let light_caches = &report.plan.light_caches;
+    if light_caches.bytes > 0 {
+        let lights = light_caches.lights;
+        let (least, most) = (light_caches.pages_least, light_caches.pages_most);
+        let s = [s(most as u64), s(lights as u64)];
+        line(format_args!("           and {least} to {most} page{} of others towards {lights} light{}", s[0], s[1]));
+    }
     let [memory, nodes] = farm.arguments(least);
     let unless = |text: Option<String>| text.unwrap_or_else(|| "nothing".to_owned());
     line(format_args!(

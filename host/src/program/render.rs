@@ -99,8 +99,17 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
     let mut fit = None;
     if let Some(memory) = args.memory {
-        let farm =
-            BudgetFarm { nodes, memory, page_memory: None, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        let light_cache = args.light.light_cache;
+        let farm = BudgetFarm {
+            nodes,
+            memory,
+            page_memory: None,
+            policy,
+            light_cache,
+            nodes_most: NODES_MAX,
+            tree: &args.tree,
+            packed,
+        };
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
         show.line(&budget_line(fit, nodes, memory, policy));
     }
@@ -119,7 +128,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         None => trace(&scene, prepared.hash, &frame, &farm, &mut watch),
         Some((memory, fit)) => {
             let pages = prepared.packed.page_slices();
-            let budget = hybray_native::Budget { memory, owners: &fit.owners, pages: &pages, settings };
+            let budget = hybray_native::Budget {
+                memory,
+                owners: &fit.owners,
+                pages: &pages,
+                light_cache: &fit.light_caches.pages,
+                settings,
+            };
             trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?
         }
     };
@@ -143,7 +158,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
             pyramid: if settings.bundle_tiles == 1 { 8 } else { 16 },
             page_bytes_max: Sizes::of(&scene).page_bytes_max,
             voxels: prepared.packed.voxels(),
-            plan: PlanReport::of(fit),
+            plan: PlanReport::of(fit, scene.shading.lights.len()),
         }
     });
     drop(pages);
@@ -236,6 +251,7 @@ fn check_budget(args: &RenderArgs) -> Result<()> {
         ("--granularity", work.granularity.is_some()),
         ("--in-system", work.in_system.is_some()),
         ("--pyramid", work.pyramid.is_some()),
+        ("--light-cache", args.light.light_cache.is_some()),
     ];
     if let Some((name, _)) = given.iter().find(|(_, given)| *given && args.memory.is_none()) {
         bail!("{name} is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB");

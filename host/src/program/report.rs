@@ -127,6 +127,20 @@ pub(super) struct PlanReport {
     pub owned_bytes_least: u64,
     /// Of the one that owns most.
     pub owned_bytes_most: u64,
+    pub light_caches: LightCachesReport,
+}
+
+/// What nodes have of others' pages towards the lights.
+#[derive(Debug, Serialize)]
+pub(super) struct LightCachesReport {
+    /// Lights that pages are kept for: all, or 0 if there are no light caches.
+    pub lights: usize,
+    /// Pages of the node that has fewest.
+    pub pages_least: usize,
+    /// Of the one that has most.
+    pub pages_most: usize,
+    /// Bytes of pages, in whole lines, of the node that has most bytes.
+    pub bytes: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -139,8 +153,17 @@ pub(super) struct Term {
 }
 
 impl PlanReport {
-    pub fn of(fit: &Fit) -> Self {
+    /// The plan of a scene with so many lights.
+    pub fn of(fit: &Fit, lights: usize) -> Self {
         let sum = fit.plan.sum();
+        let caches = &fit.light_caches;
+        let pages = || caches.pages.iter().map(Vec::len);
+        let light_caches = LightCachesReport {
+            lights: if caches.pages.is_empty() { 0 } else { lights },
+            pages_least: pages().min().unwrap_or(0),
+            pages_most: pages().max().unwrap_or(0),
+            bytes: caches.bytes,
+        };
         let terms = sum.terms().iter().map(|term| Term {
             name: term.name,
             count: term.count,
@@ -155,6 +178,7 @@ impl PlanReport {
             holds_all: fit.plan.holds_all,
             owned_bytes_least: fit.owned_bytes.iter().min().copied().unwrap_or(0),
             owned_bytes_most: fit.owned_bytes.iter().max().copied().unwrap_or(0),
+            light_caches,
         }
     }
 }

@@ -51,7 +51,16 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
     for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
         let packed = is_packed(&args.scene.scene);
-        let farm = Farm { nodes, memory, page_memory, policy, nodes_most: NODES_MAX, tree: &args.tree, packed };
+        let farm = Farm {
+            nodes,
+            memory,
+            page_memory,
+            policy,
+            light_cache: args.light.light_cache,
+            nodes_most: NODES_MAX,
+            tree: &args.tree,
+            packed,
+        };
         if nodes > 1 {
             farm.fit(&prepared, &scene)?;
         }
@@ -66,6 +75,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
     (experiment.memory, experiment.page_memory) = (args.memory, page_memory);
+    experiment.light_cache = args.light.light_cache;
     for (policy, nodes) in farms {
         experiment.settings = args.work.settings(args.machine.settings(policy));
         let s = if nodes == 1 { "" } else { "s" };

@@ -33,6 +33,8 @@ pub struct Experiment<'a> {
     pub memory: Option<u64>,
     /// What of it is for pages at most, bytes.
     pub page_memory: Option<u64>,
+    /// What of that is for light caches, bytes; as the policy has it if it is not given.
+    pub light_cache: Option<u64>,
     /// The run of one node, when it has been made.
     alone: Option<Simulated>,
     pages: Vec<&'a [u8]>,
@@ -64,6 +66,7 @@ impl<'a> Experiment<'a> {
             settings: machine.settings(Policy::default()),
             memory: None,
             page_memory: None,
+            light_cache: None,
             alone: None,
             pages: prepared.packed.page_slices(),
         }
@@ -76,7 +79,8 @@ impl<'a> Experiment<'a> {
         let (sizes, page_memory, policy) = (Sizes::of(self.scene), self.page_memory, self.settings.policy);
         let packed = &self.prepared.packed;
         let wanted = Wanted { sizes, nodes, memory, page_memory, policy };
-        wanted.fit(&packed.placed_pages(), packed.voxels()).map(Some)
+        let fit = wanted.fit(&packed.placed_pages(), packed.voxels())?;
+        Ok(Some(fit.with_light_caches(&wanted, self.light_cache, self.scene)?))
     }
 
     /// Draws it on so many nodes. `watch` is called often; the picture ends as it is when it returns false.
@@ -94,7 +98,12 @@ impl<'a> Experiment<'a> {
         watch: &mut dyn FnMut(Progress) -> bool,
     ) -> Result<Simulated, RunError> {
         let Self { machine, dispatcher, options, settings, page_memory, .. } = *self;
-        let budget = self.memory.zip(fit).map(|(memory, fit)| Budget { memory, page_memory, owners: &fit.owners });
+        let budget = self.memory.zip(fit).map(|(memory, fit)| Budget {
+            memory,
+            page_memory,
+            owners: &fit.owners,
+            light_cache: &fit.light_caches.pages,
+        });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
     }

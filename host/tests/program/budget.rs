@@ -102,6 +102,9 @@ fn how_nodes_work_changes_no_picture_either() {
         "--nodes 4 --memory 128KiB --pyramid 8 --scheduler demand-driven",
         "--nodes 4 --memory 256KiB --page-bytes 65536 --voxels 2x2x1",
         "--nodes 8 --memory 1000GiB --kernels portable",
+        "--nodes 4 --memory 256KiB --light-cache 24KiB --page-bytes 4096",
+        "--nodes 4 --memory 256KiB --light-cache 0 --scheduler hybrid-1995 --page-bytes 4096",
+        "--nodes 4 --memory 256KiB --light-cache 1GiB --scheduler data-parallel --page-bytes 4096",
     ] {
         assert_eq!(json(&folder, &format!("{usual} {more}"))["film"], film, "{more}");
     }
@@ -159,8 +162,13 @@ fn errors_name_what_would_do() {
 #[test]
 fn settings_of_budgets_want_one() {
     let folder = Folder::new();
-    for (option, value) in [("--scheduler", "hybrid"), ("--granularity", "9"), ("--in-system", "9"), ("--pyramid", "8")]
-    {
+    for (option, value) in [
+        ("--scheduler", "hybrid"),
+        ("--granularity", "9"),
+        ("--in-system", "9"),
+        ("--pyramid", "8"),
+        ("--light-cache", "0"),
+    ] {
         let output = folder.run(&format!("render spd:balls:1 -o a.png {option} {value}"));
         let said = talk(&output);
         assert_eq!(output.status.code(), Some(1), "{said}");
@@ -172,6 +180,7 @@ fn settings_of_budgets_want_one() {
         ("--granularity", "187", "1..=186"),
         ("--in-system", "0", "--in-system"),
         ("--pyramid", "12", "8, 16"),
+        ("--light-cache", "12parsecs", "`parsecs` is no unit of memory"),
         ("--memory", "0", "such as 32MiB"),
         ("--memory", "99999999999GiB", "such as 32MiB"),
         ("--memory", "12parsecs", "`parsecs` is no unit of memory"),
@@ -232,6 +241,53 @@ fn the_plan_in_words_and_in_json() {
     assert_eq!(serde_json::from_slice::<Value>(&folder.read("p.json")).unwrap()["holds_all"], true);
 }
 
+/// Light caches: what is set, what is used, what is said when it is too much, and that what is said would do does.
+#[test]
+fn light_caches_are_planned() {
+    let folder = Folder::new();
+    let plan = |more: &str| json(&folder, &format!("plan spd:balls:4 --nodes 8 --memory 256KiB {more}"));
+    let term = |r: &Value| {
+        let terms = r["terms"].as_array().unwrap();
+        let found = terms.iter().find(|term| term["name"] == "pages towards lights").unwrap_or_else(|| panic!("{r}"));
+        (whole(found, "/bytes"), whole(r, "/light_caches/pages_most"), whole(r, "/light_caches/lights"))
+    };
+    let without = plan("");
+    for none in [&without, &plan("--light-cache 0"), &plan("--light-cache 0 --scheduler hybrid-1995")] {
+        assert_eq!(term(none), (0, 0, 0));
+    }
+    let some = plan("--light-cache 20000");
+    let (bytes, pages, lights) = term(&some);
+    assert!((10_000..=20_000).contains(&bytes) && pages > 1 && lights == 3, "{bytes}, {pages}, {lights}");
+    assert_eq!(whole(&some, "/light_caches/bytes"), bytes);
+    assert!(whole(&some, "/cache_places") < whole(&without, "/cache_places"));
+    assert!(whole(&some, "/total_bytes") <= 256 * 1024);
+    // By default all that there are, or none.
+    assert_eq!(term(&plan("--scheduler hybrid-1995")), (0, 0, 0));
+    let roomy = json(&folder, "plan spd:balls:4 --nodes 8 --memory 1MiB --scheduler hybrid-1995");
+    let (bytes, ..) = term(&roomy);
+    assert!(bytes > 100_000, "{bytes}");
+    let all = json(&folder, "plan spd:balls:4 --nodes 8 --memory 1MiB --scheduler hybrid-1995 --light-cache 512KiB");
+    assert_eq!(term(&all), term(&roomy));
+    let (_, table) = folder.succeed("plan spd:balls:4 --nodes 8 --memory 256KiB --light-cache 20000");
+    let table = String::from_utf8(table).unwrap();
+    assert!(table.contains(&format!(" to {pages} pages of others towards 3 lights")), "{table}");
+    // Every page fits.
+    assert_eq!(term(&json(&folder, "plan spd:balls:4 --nodes 8 --memory 2MiB --light-cache 1MiB")), (0, 0, 0));
+
+    for verb in ["plan", "render -o a.png --size 24x16 --spp 1", "simulate --machine threads --size 16x16 --spp 1"] {
+        let run =
+            |more: &str| folder.run(&format!("{verb} spd:balls:4 --nodes 8 --memory 192KiB --light-cache {more}"));
+        let failed = run("1MiB");
+        let said = talk(&failed);
+        let last = said.lines().last().unwrap();
+        assert_eq!(failed.status.code(), Some(1), "{said}");
+        assert!(last.starts_with("hybray: --light-cache 1MiB wants "), "{last}");
+        let would_do = last.split_once("give --light-cache ").unwrap_or_else(|| panic!("{last}")).1;
+        let output = run(would_do);
+        assert_eq!(output.status.code(), Some(0), "{last}: {}", talk(&output));
+    }
+}
+
 /// The examples of docs/MEMORY.md are what the program prints.
 #[test]
 fn the_examples_in_the_document() {
@@ -278,7 +334,7 @@ fn the_terms_in_the_document() {
                 a_page += each;
             }
             "a page and a node of it" => a_page += each,
-            "a share" | "the scene's" | "what is left" => {}
+            "a share" | "the scene's" | "what is left" | "as set" => {}
             said => assert_eq!(said, count.to_string(), "{term}"),
         }
     }

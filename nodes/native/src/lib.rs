@@ -11,7 +11,7 @@ use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
     All, Asked, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome,
-    PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw,
+    PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw, light_cache_bytes,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -51,6 +51,8 @@ pub struct Budget<'a> {
     pub owners: &'a [u16],
     /// The bytes of each page.
     pub pages: &'a [&'a [u8]],
+    /// Pages of others that each node has in its light cache, node 1's first; or none.
+    pub light_cache: &'a [Vec<u32>],
     /// How nodes work.
     pub settings: Settings,
 }
@@ -119,6 +121,8 @@ pub fn trace_within(
     let mut scene = *scene;
     scene.resident.directory.entries = &entries;
     let plan = plan(&scene, farm.nodes, budget.memory, budget.settings.policy)?;
+    let light_bytes = light_cache_bytes(scene.resident.directory.entries, budget.light_cache);
+    let plan = plan.with_light_cache(light_bytes, budget.memory)?;
     let bytes = plan.sum().total_bytes();
     Ok(run(frame, scene_hash, farm, budget.pages, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
@@ -128,6 +132,10 @@ pub fn trace_within(
             if plan.holds_all || scene.resident.directory.entries[page as usize].owner == peer {
                 assert!(cache.put(page, bytes), "page {page} is none");
             }
+        }
+        let lights = budget.light_cache.get(usize::from(peer) - 1).filter(|_| !plan.holds_all);
+        for &page in lights.into_iter().flatten() {
+            assert!(cache.put(page, budget.pages[page as usize]), "page {page} is none");
         }
         let settings = plan.settings(budget.settings);
         let node = Node::new(scene, cache, scene_hash, farm.kernels, peer, dispatcher_at(farm), settings, memory);

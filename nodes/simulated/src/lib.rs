@@ -26,7 +26,7 @@ use hybray_link::Peer;
 use hybray_scene::{Line, lines_for, parents};
 use hybray_scheduler::{
     Asked, Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, PageServer, Plan, PlanError, Progress,
-    Settings, Sizes, TileState, can_draw,
+    Settings, Sizes, TileState, can_draw, light_cache_bytes,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -60,6 +60,8 @@ pub struct Budget<'a> {
     pub page_memory: Option<u64>,
     /// The node that owns each page.
     pub owners: &'a [u16],
+    /// Pages of others that each node has in its light cache, node 1's first; or none.
+    pub light_cache: &'a [Vec<u32>],
 }
 
 /// Why there is no result.
@@ -218,12 +220,15 @@ pub fn simulate_spoiled(
         if let Some(bytes) = budget.page_memory {
             plan = plan.with_page_memory(bytes, farm.nodes, owned_max);
         }
+        let memory = budget.page_memory.map_or(budget.memory, |_| plan.sum().total_bytes());
+        plan = plan.with_light_cache(light_cache_bytes(&entries, budget.light_cache), memory)?;
     }
     scene.resident.directory.entries = &entries;
     let mut up = vec![0; scene.resident.directory.nodes.len() + entries.len()];
     parents(scene.resident.directory.nodes, &mut up);
     let (settings, dispatcher) = (farm.settings, farm.dispatcher);
-    let shared = worker::Shared { scene, scene_hash, up: &up, pages, plan, settings, dispatcher };
+    let light_cache = farm.budget.map_or(&[][..], |budget| budget.light_cache);
+    let shared = worker::Shared { scene, scene_hash, up: &up, pages, light_cache, plan, settings, dispatcher };
     let mut memories: Vec<worker::Memory> = (1..peers).map(|_| worker::memory(&plan)).collect();
     let workers = (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
     let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);

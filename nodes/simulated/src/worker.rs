@@ -27,6 +27,8 @@ pub(crate) struct Shared<'s> {
     pub up: &'s [u32],
     /// The bytes of each page.
     pub pages: &'s [&'s [u8]],
+    /// What each node has of others' pages for good, node 1's first.
+    pub light_cache: &'s [Vec<u32>],
     pub plan: Plan,
     pub settings: Settings,
     pub dispatcher: Peer,
@@ -41,13 +43,17 @@ pub(crate) struct Worker<'s> {
 impl<'s> Worker<'s> {
     /// It runs the portable walk, whatever the processor has: what it counts is the same everywhere (DESIGN, law 7).
     pub fn new(shared: &Shared<'s>, me: Peer, memory: &'s mut Memory) -> Self {
-        let Shared { scene, scene_hash, up, pages, plan, settings, dispatcher } = *shared;
+        let Shared { scene, scene_hash, up, pages, light_cache, plan, settings, dispatcher } = *shared;
         let (memory, mut cache) =
             plan.charge(&mut Arena::new(memory), &scene, up, pages).expect("the sum of its terms");
         for (page, entry) in (0..).zip(scene.resident.directory.entries) {
             if plan.holds_all || entry.owner == me {
                 cache.put(page, entry.bytes as usize);
             }
+        }
+        let lights = light_cache.get(usize::from(me) - 1).filter(|_| !plan.holds_all);
+        for &page in lights.into_iter().flatten() {
+            cache.put(page, scene.resident.directory.entries[page as usize].bytes as usize);
         }
         let settings = plan.settings(settings);
         let node = Node::new(scene, cache, scene_hash, Kernels::Portable, me, dispatcher, settings, memory);

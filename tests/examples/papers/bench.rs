@@ -39,6 +39,8 @@ pub struct Job {
     pub memory_mib: Option<u64>,
     /// A node has page memory for the scene's pages divided by this.
     pub share: Option<u64>,
+    /// Bytes for light caches, if it is not the scheduler's default.
+    pub light_cache: Option<u64>,
     /// Node 1 gives out tiles, not the host.
     pub is_dispatched_by_node: bool,
     /// T, if it is not learned.
@@ -67,6 +69,7 @@ impl Job {
             policy: Policy::Hybrid,
             memory_mib: Some(32),
             share: None,
+            light_cache: None,
             is_dispatched_by_node: false,
             spread: None,
             atomic: None,
@@ -89,7 +92,7 @@ impl Job {
 
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
-        Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, ..self.clone() }
+        Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..self.clone() }
     }
 }
 
@@ -283,6 +286,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     };
     let scene_bytes = Sizes::of(&scene).pages_bytes;
     experiment.memory = job.memory_mib.map(|mib| mib << 20);
+    experiment.light_cache = job.light_cache;
     experiment.page_memory = job.share.map(|share| scene_bytes / share);
     let tiles: u64 = job.size.iter().map(|&side| u64::from(side.div_ceil(8))).product();
     let mut turns = TURNS_MAX * (tiles + u64::from(job.nodes)) * u64::from(job.samples);

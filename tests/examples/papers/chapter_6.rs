@@ -122,14 +122,17 @@ fn both(bench: &Bench, job: &Job, policy: Policy, row: &Row) -> Result<Vec<Strin
 /// Table 6.6: light caches.
 pub fn light_cache(bench: &Bench, published: &Published) -> Result<String> {
     let first = ["model", "nodes", "with: s", "busy %", "without: s", "busy %"];
-    let mut table = table(&first, &["`hybrid-1995`, without", "`hybrid`"]);
+    let mut table = table(&first, &["`hybrid-1995`, with", "`hybrid-1995`, without", "`hybrid`"]);
     for row in published.table("t6_6_light_cache")? {
         let mut line = columns(
             row,
             &["model", "processors", "with_cache_s", "with_cache_eff", "without_cache_s", "without_cache_eff"],
         )?;
         let job = Job::of_1995(&format!("paper:{}", row.text("model")?), row.number("processors")?);
-        line.extend(both(bench, &job, Policy::Hybrid1995, row)?);
+        let with = job.clone().in_1995(Policy::Hybrid1995, row.text("grid")?);
+        for job in [with.clone(), Job { light_cache: Some(0), ..with }, job] {
+            line.extend(run(bench, &job));
+        }
         table.row(line);
     }
     Ok(table.finish())

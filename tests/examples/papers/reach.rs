@@ -204,8 +204,8 @@ pub fn thousand(bench: &Bench, _: &Published) -> Result<String> {
 pub fn mechanisms(bench: &Bench, _: &Published) -> Result<String> {
     let large = Job::of_1995("paper:balls5", 32);
     let small = Job::of_1995("paper:balls", 32);
-    let with_large = mechanism_rows(bench, &large.clone().with_share(16), &Job { page_bytes: 4096, ..large });
-    let with_small = mechanism_rows(bench, &small.clone().with_share(16), &Job { page_bytes: 4096, ..small });
+    let with_large = mechanism_rows(bench, &large.clone().with_share(16), &Job { page_bytes: 4096, ..large }, true);
+    let with_small = mechanism_rows(bench, &small.clone().with_share(16), &Job { page_bytes: 4096, ..small }, false);
     Ok(format!(
         "Balls of 66,430 spheres, page memory a sixteenth of the scene, 32 nodes:\n\n{with_large}\n\
          Balls of 7,381 spheres, the same:\n\n{with_small}"
@@ -213,7 +213,7 @@ pub fn mechanisms(bench: &Bench, _: &Published) -> Result<String> {
 }
 
 /// One after the other changed in `job`; `roomy` is the same with room for copies of every page.
-fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job) -> String {
+fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job, light_caches_fit: bool) -> String {
     let names = ["", "s", "eff. %", "messages", "MB", "rays forwarded", "pages fetched"];
     let mut table = Table::new(&names);
     let changed = |change: &dyn Fn(&mut Job)| {
@@ -237,7 +237,9 @@ fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job) -> String {
         ),
         ("room for copies of every page on every node", roomy.clone()),
     ];
-    for (name, job) in rows {
+    let with_light = changed(&|job| job.light_cache = Some(16 << 10));
+    let with_light = light_caches_fit.then_some(("light caches of 16 KiB (`hybrid` has none by default)", with_light));
+    for (name, job) in rows.into_iter().chain(with_light) {
         let mut line = vec![name.to_owned()];
         line.extend(match bench.compared(&job) {
             Ok(found) => vec![

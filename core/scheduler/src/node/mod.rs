@@ -74,6 +74,8 @@ pub struct Settings {
     pub in_system: u32,
     /// Pages that may be on their way here, 1 to [`REQUESTS_MAX`].
     pub requests: u8,
+    /// Shadow rays are tested against all pages at hand first, and what is left of them is forwarded: with light caches.
+    pub lights_first: bool,
 }
 
 impl Default for Settings {
@@ -88,6 +90,7 @@ impl Default for Settings {
             bundle_tiles: 4,
             in_system: 4096,
             requests: 8,
+            lights_first: false,
         }
     }
 }
@@ -422,7 +425,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, .. } = &mut self.memory;
         let Bundle { rays, walked, places, scratch, stack } = &mut **bundle;
         let scene = self.scene.at_hand(&self.store);
-        let mut walker = Walker { kernels: self.kernels, stack, counts: Default::default() };
+        let (kernels, past) = (self.kernels, self.settings.lights_first);
+        let mut walker = Walker { kernels, past, stack, counts: Default::default() };
         let mut lane = Lane::resume(lane, self.depth);
         let mut counts = Counts::default();
         let mut sums = Sums {

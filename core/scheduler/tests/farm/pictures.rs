@@ -49,7 +49,8 @@ impl Picture {
             Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height).unwrap();
         let filter = Filter::from_u32(u32::from(frame.filter)).unwrap();
         let (mut stack, mut records) = (Stack::new(), vec![HitRecord::EMPTY; 64]);
-        let mut walker = Walker { kernels: Kernels::Portable, stack: &mut stack, counts: Default::default() };
+        let mut walker =
+            Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
         let mut counts = Counts::default();
         let mut sums = Vec::new();
         let mut rays = Vec::new();
