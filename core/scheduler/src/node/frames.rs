@@ -211,21 +211,17 @@ impl<P: Store> Node<'_, '_, P> {
                 continue;
             }
             let since = state.since;
-            if state.none_to_share {
-                state.none_to_share = !send(link, peer, &Message::Rays { rays: 0, shadows: 0, load });
-                if state.none_to_share {
-                    m.peers.send_on(peer, since);
-                    continue;
-                }
-                sent = true;
-            }
-            if state.outbox.is_empty() {
-                continue;
-            }
             let due =
                 idle || state.outbox.len() >= granularity || now.saturating_sub(since) >= self.settings.deadline_ns;
-            if !due || !rules::may_send(state.flight.len()) {
-                m.peers.send_on(peer, since);
+            if state.outbox.is_empty() || !due || !rules::may_send(state.flight.len()) {
+                // After rays: whoever hears it asks for a share again, and the word would take their room on the link for ever.
+                if state.none_to_share {
+                    state.none_to_share = !send(link, peer, &Message::Rays { rays: 0, shadows: 0, load });
+                    sent |= !state.none_to_share;
+                }
+                if state.none_to_share || !state.outbox.is_empty() {
+                    m.peers.send_on(peer, since);
+                }
                 continue;
             }
             let mut outbox = core::mem::take(&mut state.outbox);
@@ -256,9 +252,10 @@ impl<P: Store> Node<'_, '_, P> {
             } else {
                 m.pool.put_back(&mut outbox, front);
             }
-            let more = !outbox.is_empty();
+            let mut more = !outbox.is_empty();
             if let Some(state) = m.peers.get(peer) {
                 (state.outbox, state.flight) = (outbox, flight);
+                more |= state.none_to_share;
             }
             if more {
                 m.peers.send_on(peer, if went { now } else { since });
