@@ -48,7 +48,7 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
                 assert!(plan.sum().total_bytes() <= memory, "{plan:?}");
                 light_pages += caches.pages.iter().map(Vec::len).sum::<usize>();
                 let (pages, light_cache) = (&pages, &caches.pages);
-                let budget = Budget { memory, owners: &owners, pages, light_cache, settings };
+                let budget = Budget { memory, owners: &owners, pages, copies: light_cache, parts: &[], settings };
                 let what = || {
                     let lights = caches.bytes;
                     format!(

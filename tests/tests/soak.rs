@@ -223,7 +223,8 @@ impl Draw {
             memory: *memory,
             page_memory: None,
             owners,
-            light_cache: &caches.pages,
+            copies: &caches.pages,
+            parts: &[],
         });
         let Self { nodes, dispatcher, options, settings, .. } = *self;
         let farm = Farm { machine: &self.machine, nodes, dispatcher, options, settings, budget };

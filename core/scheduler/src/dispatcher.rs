@@ -190,7 +190,7 @@ impl<'m> Dispatcher<'m> {
         if sound { Self { bounds, biased: true, ..self } } else { self }
     }
 
-    /// On a node: it has less time for tiles than others, and takes none from their parts.
+    /// On a node: it has less time for tiles than others, and takes none from their parts where parts are given.
     #[must_use]
     pub fn on(self, me: Peer) -> Self {
         Self { me, ..self }
@@ -585,7 +585,8 @@ impl<'m> Dispatcher<'m> {
                 let node = &self.nodes[peer];
                 // The first run is what a node waits for. Where the dispatcher is near, the second can wait until all have one.
                 let first = wanted == 1 || all_here || node.tiles_done > 0 || self.me == HOST;
-                let has_no_part = self.biased && self.me != HOST && peer == usize::from(self.me) && node.left() == 0;
+                let only_own = !self.bounds.is_empty() && self.me != HOST && peer == usize::from(self.me);
+                let has_no_part = only_own && node.left() == 0;
                 if !node.here || node.runs.len() >= wanted || !first || (has_no_part && crew.here > 1) {
                     continue;
                 }

@@ -9,6 +9,7 @@ use hybray_geometry::Candidate;
 use hybray_geometry::simd::Kernels;
 use hybray_scene::{PageView, Pages};
 use hybray_scheduler::DEPTH_MAX;
+use hybray_scheduler::policy::Policy;
 use hybray_shading::{Camera, id};
 use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker};
 use hybray_wire::{Counts, Frame, RayKind, RayRecord, TileMap};
@@ -72,6 +73,12 @@ impl Sink for Nowhere {
 }
 
 impl Pilot {
+    /// What goes ahead of `frame` under `policy`: the others than `hybrid` place pages as published.
+    #[must_use]
+    pub fn of_policy(policy: Policy, scene: &Scene<'_>, frame: &Frame) -> Option<Self> {
+        (policy == Policy::Hybrid).then(|| Self::trace(scene, frame)).flatten()
+    }
+
     /// Traces some rays of `frame`, with every page at hand. `None` if the picture cannot be drawn.
     ///
     /// The portable kernels count the same on every processor, so that what is decided by it is the same, too.

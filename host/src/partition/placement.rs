@@ -7,71 +7,69 @@
 use super::{Parts, PlacedPage};
 use std::cmp::Reverse;
 
-/// Where pages are when a picture begins.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Placement {
-    /// The owner of each page, from 1 on.
-    pub owners: Vec<u16>,
-    /// Pages of others that each node has from the beginning, node 1's first.
-    pub copies: Vec<Vec<u32>>,
-}
-
-/// Places `pages`: each node owns `owned_max` bytes of them at most, and has `kept_max` with the copies. `None` if pages
-/// do not fit that way: some order of them may.
+/// The owner of each page, from 1 on, such that no node owns more than `owned_max` bytes. `None` if pages do not fit that
+/// way: some order of them may.
 ///
 /// # Panics
 /// If a part opened a page that there is not.
 #[must_use]
-pub fn place(pages: &[PlacedPage], parts: &Parts, owned_max: u64, kept_max: u64) -> Option<Placement> {
+pub fn owners_by_use(pages: &[PlacedPage], parts: &Parts, owned_max: u64) -> Option<Vec<u16>> {
     let nodes = parts.uses.len();
-    let bytes = |page: u32| u64::from(pages[page as usize].bytes);
     let mut owners = vec![0; pages.len()];
     let mut owned = vec![0; nodes];
-    let mut own = |owner: &mut u16, node: usize, bytes: u64| {
-        let fits = owned[node] + bytes <= owned_max;
+    let mut own = |owner: &mut u16, node: usize, bytes: u32| {
+        let fits = owned[node] + u64::from(bytes) <= owned_max;
         if fits {
             *owner = node as u16 + 1;
-            owned[node] += bytes;
+            owned[node] += u64::from(bytes);
         }
         fits
     };
-    let mut uses: Vec<_> =
-        parts.uses.iter().enumerate().flat_map(|(node, uses)| uses.iter().map(move |&u| (node, u))).collect();
+    let of_node = |(node, uses): (usize, &Vec<(u32, u32)>)| uses.iter().map(|&u| (node, u)).collect::<Vec<_>>();
+    let mut uses: Vec<_> = parts.uses.iter().enumerate().flat_map(of_node).collect();
     uses.sort_unstable_by_key(|&(node, (page, count))| (Reverse(count), node, page));
     for &(node, (page, _)) in &uses {
         let owner = &mut owners[page as usize];
         if *owner == 0 {
-            own(owner, node, bytes(page));
+            own(owner, node, pages[page as usize].bytes);
         }
     }
     // What nobody opened, and what had no room where it was opened: neighbours stay together.
     let mut at = 0;
-    for (page, owner) in owners.iter_mut().enumerate().filter(|(_, owner)| **owner == 0) {
-        at = (at..at + nodes).map(|node| node % nodes).find(|&node| own(owner, node, bytes(page as u32)))?;
+    for (page, owner) in pages.iter().zip(&mut owners).filter(|(_, owner)| **owner == 0) {
+        at = (at..at + nodes).map(|node| node % nodes).find(|&node| own(owner, node, page.bytes))?;
     }
+    Some(owners)
+}
+
+/// Pages that each node gets beside its own and those of `before`, up to `most` bytes: node 1's first, the most useful first.
+///
+/// # Panics
+/// If a part opened a page that there is not.
+#[must_use]
+pub fn copies(pages: &[PlacedPage], parts: &Parts, owners: &[u16], before: &[Vec<u32>], most: u64) -> Vec<Vec<u32>> {
     let mut total = vec![0u64; pages.len()];
-    uses.iter().for_each(|&(_, (page, count))| total[page as usize] += u64::from(count));
+    parts.uses.iter().flatten().for_each(|&(page, count)| total[page as usize] += u64::from(count));
     let mut all: Vec<u32> = (0..pages.len() as u32).filter(|&page| total[page as usize] > 0).collect();
     all.sort_by_key(|&page| Reverse(total[page as usize]));
-    let copies = (0..nodes).map(|node| {
+    let of_node = |(node, uses): (usize, &Vec<(u32, u32)>)| {
         let mut has: Vec<bool> = owners.iter().map(|&owner| usize::from(owner) == node + 1).collect();
-        let mut room = kept_max.saturating_sub(owned[node]);
-        let mut own = parts.uses[node].clone();
+        before.get(node).into_iter().flatten().for_each(|&page| has[page as usize] = true);
+        let mut room = most;
+        let mut own = uses.clone();
         own.sort_by_key(|&(_, count)| Reverse(count));
-        let wanted = own.iter().map(|&(page, _)| page).chain(all.iter().copied());
-        wanted
-            .filter(|&page| {
-                let takes = !has[page as usize] && bytes(page) <= room;
-                if takes {
-                    has[page as usize] = true;
-                    room -= bytes(page);
-                }
-                takes
-            })
-            .collect()
-    });
-    let copies = copies.collect();
-    Some(Placement { owners, copies })
+        let takes = |page: &u32| {
+            let bytes = u64::from(pages[*page as usize].bytes);
+            let takes = !has[*page as usize] && bytes <= room;
+            if takes {
+                has[*page as usize] = true;
+                room -= bytes;
+            }
+            takes
+        };
+        own.iter().map(|&(page, _)| page).chain(all.iter().copied()).filter(takes).collect()
+    };
+    parts.uses.iter().enumerate().map(of_node).collect()
 }
 
 #[cfg(test)]
@@ -99,18 +97,28 @@ mod tests {
             let total: u64 = pages.iter().map(|page| u64::from(page.bytes)).sum();
             let largest = pages.iter().map(|page| u64::from(page.bytes)).max().unwrap_or(0);
             let owned_max = total / nodes as u64 + random.below(1 + 2 * largest);
-            let kept_max = owned_max + random.below(1 + total);
-            let Some(Placement { owners, copies }) = place(&pages, &parts, owned_max, kept_max) else {
+            let most = random.below(1 + total);
+            let Some(owners) = owners_by_use(&pages, &parts, owned_max) else {
                 assert!(owned_max < total / nodes as u64 + largest, "seed {seed}: there is room");
                 continue;
             };
             placed += 1;
+            let before: Vec<Vec<u32>> = if random.below(2) == 0 {
+                Vec::new()
+            } else {
+                (0..nodes)
+                    .map(|_| (0..random.below(3)).map(|_| random.below(pages.len() as u64) as u32).collect())
+                    .collect()
+            };
+            let copies = copies(&pages, &parts, &owners, &before, most);
+            let had = |node: usize, page: u32| before.get(node).is_some_and(|before| before.contains(&page));
             let bytes = |page: u32| u64::from(pages[page as usize].bytes);
             for node in 0..nodes {
                 let owns = |page: &u32| usize::from(owners[*page as usize]) == node + 1;
                 let owned: u64 = (0..pages.len() as u32).filter(owns).map(bytes).sum();
                 let copied_bytes: u64 = copies[node].iter().map(|&page| bytes(page)).sum();
-                assert!(owned <= owned_max && owned + copied_bytes <= kept_max.max(owned), "seed {seed}, node {node}");
+                assert!(owned <= owned_max && copied_bytes <= most, "seed {seed}, node {node}");
+                assert!(!copies[node].iter().any(|&page| had(node, page)), "seed {seed}: has it");
                 let mut seen = copies[node].clone();
                 seen.sort_unstable();
                 seen.dedup();
@@ -118,8 +126,10 @@ mod tests {
                 assert!(!copies[node].iter().any(owns), "seed {seed}: its own");
                 copied += seen.len();
                 // What it opened and has not found no room behind what it opened as often or more.
-                for &(page, _) in parts.uses[node].iter().filter(|(page, _)| !owns(page) && !seen.contains(page)) {
-                    assert!(owned + copied_bytes + bytes(page) > kept_max, "seed {seed}: page {page} would fit");
+                for &(page, _) in
+                    parts.uses[node].iter().filter(|(page, _)| !owns(page) && !seen.contains(page) && !had(node, *page))
+                {
+                    assert!(copied_bytes + bytes(page) > most, "seed {seed}: page {page} would fit");
                 }
             }
             for (page, &owner) in (0..).zip(&owners) {

@@ -1,7 +1,7 @@
 //! Nodes with a budget, for every command that has them: what fits, and what people are told if it does not.
 
 use super::args::TreeArgs;
-use crate::partition::{Fit, NoFit, Wanted, page_bytes_for};
+use crate::partition::{Fit, NoFit, Pilot, Wanted, page_bytes_for};
 use crate::prepare::Prepared;
 use anyhow::{Result, bail};
 use hybray_scheduler::policy::Policy;
@@ -21,6 +21,10 @@ pub(super) struct Farm<'a> {
     pub policy: Policy,
     /// For light caches, bytes; as the policy has it if it is not given.
     pub light_cache: Option<u64>,
+    /// What rays of the picture found that were ahead of it, if there were any.
+    pub pilot: Option<&'a Pilot>,
+    /// Whether node 1 gives the tiles out.
+    pub first_dispatches: bool,
     /// Nodes that the command can have.
     pub nodes_most: u16,
     pub tree: &'a TreeArgs,
@@ -44,8 +48,19 @@ impl Farm<'_> {
     /// If the scene does not fit: one line that says which arguments would do.
     pub fn fit(&self, prepared: &Prepared, scene: &Scene<'_>) -> Result<Fit> {
         let wanted = self.wanted(scene);
-        match wanted.fit(&prepared.packed.placed_pages(), prepared.packed.voxels()) {
-            Ok(fit) => self.with_light_caches(fit, &wanted, scene),
+        let (pages, voxels) = (prepared.packed.placed_pages(), prepared.packed.voxels());
+        match wanted.fit_picture(&pages, voxels, scene, self.light_cache, self.pilot) {
+            Ok(fit) => Ok(fit),
+            Err(NoFit::Plan(PlanError::LightCache { bytes, room })) => {
+                let room = if room < KIB { room } else { room / KIB * KIB };
+                bail!(
+                    "--light-cache {} wants {bytes} bytes of pages, too many beside what else each node has with {}: \
+                     give --light-cache {}",
+                    size(self.light_cache.unwrap_or(bytes)),
+                    memory(self.memory),
+                    size(room)
+                )
+            }
             Err(NoFit::Plan(PlanError::Memory { .. })) => {
                 bail!(
                     "{} is less than each of {} needs for this scene: {}",
@@ -64,23 +79,6 @@ impl Farm<'_> {
         }
     }
 
-    fn with_light_caches(&self, fit: Fit, wanted: &Wanted, scene: &Scene<'_>) -> Result<Fit> {
-        match fit.with_light_caches(wanted, self.light_cache, scene) {
-            Ok(fit) => Ok(fit),
-            Err(PlanError::LightCache { bytes, room }) => {
-                let room = if room < KIB { room } else { room / KIB * KIB };
-                bail!(
-                    "--light-cache {} wants {bytes} bytes of pages, too many beside what else each node has with {}: \
-                     give --light-cache {}",
-                    size(self.light_cache.unwrap_or(bytes)),
-                    memory(self.memory),
-                    size(room)
-                )
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
     /// What is enough for this scene.
     pub fn least(&self, scene: &Scene<'_>) -> Least {
         let wanted = self.wanted(scene);
@@ -88,8 +86,8 @@ impl Farm<'_> {
     }
 
     fn wanted(&self, scene: &Scene<'_>) -> Wanted {
-        let Self { nodes, memory, page_memory, policy, .. } = *self;
-        Wanted { sizes: Sizes::of(scene), nodes, memory, page_memory, policy }
+        let Self { nodes, memory, page_memory, policy, first_dispatches, .. } = *self;
+        Wanted { sizes: Sizes::of(scene), nodes, memory, page_memory, policy, first_dispatches }
     }
 
     fn remedies(&self, wanted: &Wanted) -> String {

@@ -6,7 +6,7 @@ use super::report::{PlanReport, ReportFile};
 use super::{End, prepare};
 use crate::model::Settings;
 use crate::pack::is_packed;
-use crate::partition::{Fit, page_bytes_for};
+use crate::partition::{Fit, Pilot, page_bytes_for};
 use crate::simulate::runs::{name_of, seconds};
 use anyhow::Result;
 use hybray_scheduler::Sizes;
@@ -106,12 +106,16 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     let sizes = Sizes::of(&scene);
+    let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
+    let pilot = Pilot::of_policy(args.scheduler, &scene, &frame).filter(|_| args.nodes > 1);
     let farm = Farm {
         nodes: args.nodes,
         memory: args.memory,
         page_memory: args.page_memory.map(|page_memory| page_memory.bytes(sizes.pages_bytes)),
         policy: args.scheduler,
         light_cache: args.light.light_cache,
+        pilot: pilot.as_ref(),
+        first_dispatches: false,
         nodes_most: NODES_MAX,
         tree: &args.tree,
         packed: is_packed(&args.scene.scene),
@@ -119,7 +123,6 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let fit = farm.fit(&prepared, &scene)?;
     let least = farm.least(&scene);
     let progress = args.machine.map(|machine| {
-        let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
         let tiles = TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
         let settings = fit.plan.settings(machine.settings(args.scheduler));
         Bounds { machine: machine.name, bound: Bound::new(&scene, &fit.plan, &settings, machine, args.nodes, tiles, 0) }

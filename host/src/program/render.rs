@@ -11,7 +11,7 @@ use super::{End, camera, load, prepare};
 use crate::film::{FilmFileError, Kept, Subject, path_for};
 use crate::model::Settings;
 use crate::pack::is_packed;
-use crate::partition::{Fit, page_bytes_for};
+use crate::partition::{Fit, Pilot, page_bytes_for};
 use crate::picture::{Format, Output, Picture};
 use crate::prepare::Prepared;
 use crate::simulate::runs::name_of;
@@ -100,12 +100,15 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let mut fit = None;
     if let Some(memory) = args.memory {
         let light_cache = args.light.light_cache;
+        let pilot = Pilot::of_policy(policy, &scene, &frame).filter(|_| nodes > 1);
         let farm = BudgetFarm {
             nodes,
             memory,
             page_memory: None,
             policy,
             light_cache,
+            pilot: pilot.as_ref(),
+            first_dispatches: farm.dispatcher == DispatcherAt::Node,
             nodes_most: NODES_MAX,
             tree: &args.tree,
             packed,
@@ -132,7 +135,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
                 memory,
                 owners: &fit.owners,
                 pages: &pages,
-                light_cache: &fit.light_caches.pages,
+                copies: &fit.copies,
+                parts: &fit.parts,
                 settings,
             };
             trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?

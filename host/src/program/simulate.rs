@@ -57,6 +57,8 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
             page_memory,
             policy,
             light_cache: args.light.light_cache,
+            pilot: None,
+            first_dispatches: false,
             nodes_most: NODES_MAX,
             tree: &args.tree,
             packed,

@@ -4,14 +4,15 @@
 //! made once for all the others.
 
 use super::record::{NodeRun, QueueRun, Rays, Run};
-use crate::partition::{Fit, NoFit, Wanted};
+use crate::partition::{Fit, NoFit, Pilot, Wanted};
 use crate::prepare::Prepared;
-use hybray_link::Peer;
+use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{Options, Outcome, Progress, Settings, Sizes};
 use hybray_simulated::{Budget, Farm, Machine, SimulateError, Simulated, simulate};
 use hybray_tracer::Scene;
 use hybray_wire::{Counts, Frame};
+use std::cell::OnceCell;
 
 /// The same picture on one machine, for any number of nodes.
 pub struct Experiment<'a> {
@@ -35,6 +36,8 @@ pub struct Experiment<'a> {
     pub page_memory: Option<u64>,
     /// What of that is for light caches, bytes; as the policy has it if it is not given.
     pub light_cache: Option<u64>,
+    /// What rays of the picture found that were ahead of it, when that was asked for.
+    pilot: OnceCell<Option<Pilot>>,
     /// The run of one node, when it has been made.
     alone: Option<Simulated>,
     pages: Vec<&'a [u8]>,
@@ -61,12 +64,13 @@ impl<'a> Experiment<'a> {
             scene,
             frame,
             machine,
-            dispatcher: hybray_link::HOST,
+            dispatcher: HOST,
             options: Options::default(),
             settings: machine.settings(Policy::default()),
             memory: None,
             page_memory: None,
             light_cache: None,
+            pilot: OnceCell::new(),
             alone: None,
             pages: prepared.packed.page_slices(),
         }
@@ -78,9 +82,12 @@ impl<'a> Experiment<'a> {
         let Some(memory) = self.memory.filter(|_| nodes > 1) else { return Ok(None) };
         let (sizes, page_memory, policy) = (Sizes::of(self.scene), self.page_memory, self.settings.policy);
         let packed = &self.prepared.packed;
-        let wanted = Wanted { sizes, nodes, memory, page_memory, policy };
-        let fit = wanted.fit(&packed.placed_pages(), packed.voxels())?;
-        Ok(Some(fit.with_light_caches(&wanted, self.light_cache, self.scene)?))
+        let first_dispatches = self.dispatcher != HOST;
+        let wanted = Wanted { sizes, nodes, memory, page_memory, policy, first_dispatches };
+        let trace = || Pilot::of_policy(Policy::Hybrid, self.scene, self.frame);
+        let pilot = if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None };
+        let (pages, voxels) = (packed.placed_pages(), packed.voxels());
+        wanted.fit_picture(&pages, voxels, self.scene, self.light_cache, pilot).map(Some)
     }
 
     /// Draws it on so many nodes. `watch` is called often; the picture ends as it is when it returns false.
@@ -102,7 +109,8 @@ impl<'a> Experiment<'a> {
             memory,
             page_memory,
             owners: &fit.owners,
-            light_cache: &fit.light_caches.pages,
+            copies: &fit.copies,
+            parts: &fit.parts,
         });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)

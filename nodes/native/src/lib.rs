@@ -51,8 +51,10 @@ pub struct Budget<'a> {
     pub owners: &'a [u16],
     /// The bytes of each page.
     pub pages: &'a [&'a [u8]],
-    /// Pages of others that each node has in its light cache, node 1's first; or none.
-    pub light_cache: &'a [Vec<u32>],
+    /// Pages of others that each node has from the beginning, node 1's first; or none.
+    pub copies: &'a [Vec<u32>],
+    /// Where each node's part of the picture begins, in tiles, node 1's first, and the last one ends; none if all are of as many.
+    pub parts: &'a [u32],
     /// How nodes work.
     pub settings: Settings,
 }
@@ -89,7 +91,7 @@ pub struct Traced {
 pub fn trace(scene: &Scene<'_>, scene_hash: u64, frame: &Frame, farm: &Farm, watch: &mut dyn Watch) -> Option<Traced> {
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes();
-    run(frame, scene_hash, farm, &[], watch, &|peer, link, dispatcher, clock| {
+    run(frame, scene_hash, farm, None, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
         let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
@@ -121,10 +123,10 @@ pub fn trace_within(
     let mut scene = *scene;
     scene.resident.directory.entries = &entries;
     let plan = plan(&scene, farm.nodes, budget.memory, budget.settings.policy)?;
-    let light_bytes = light_cache_bytes(scene.resident.directory.entries, budget.light_cache);
+    let light_bytes = light_cache_bytes(scene.resident.directory.entries, budget.copies);
     let plan = plan.with_light_cache(light_bytes, budget.memory)?;
     let bytes = plan.sum().total_bytes();
-    Ok(run(frame, scene_hash, farm, budget.pages, watch, &|peer, link, dispatcher, clock| {
+    Ok(run(frame, scene_hash, farm, Some(budget), watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let (memory, mut cache, scene) =
             plan.carve(&mut Arena::new(&mut memory), &scene).expect("the sum of its terms");
@@ -133,8 +135,8 @@ pub fn trace_within(
                 assert!(cache.put(page, bytes), "page {page} is none");
             }
         }
-        let lights = budget.light_cache.get(usize::from(peer) - 1).filter(|_| !plan.holds_all);
-        for &page in lights.into_iter().flatten() {
+        let copies = budget.copies.get(usize::from(peer) - 1).filter(|_| !plan.holds_all);
+        for &page in copies.into_iter().flatten() {
             assert!(cache.put(page, budget.pages[page as usize]), "page {page} is none");
         }
         let settings = plan.settings(budget.settings);
@@ -194,18 +196,19 @@ pub struct Worked {
     pub high_water: HighWater,
 }
 
-/// Runs the machines; the host gives out `pages` whose owners are lost. `node` makes and turns each node, on a thread of its own.
+/// Runs the machines; the host gives out pages of the `budget` whose owners are lost. `node` makes and turns each node, on a thread of its own.
 fn run(
     frame: &Frame,
     scene_hash: u64,
     farm: &Farm,
-    pages: &[&[u8]],
+    budget: Option<&Budget<'_>>,
     watch: &mut dyn Watch,
     node: &Turn<'_>,
 ) -> Option<Traced> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
     let nodes = farm.nodes.clamp(1, NODES_MAX);
     let peers = usize::from(nodes) + 1;
+    let (pages, parts) = budget.map_or((&[][..], &[][..]), |budget| (budget.pages, budget.parts));
     // Where nodes must ask for pages, each does best to draw on the same ones for long.
     let biased = !pages.is_empty();
     // A bit for each tile, where tiles are given out.
@@ -230,15 +233,20 @@ fn run(
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
                 let mut kept = vec![0; if here { kept_words } else { 0 }];
-                let dispatcher =
-                    here.then(|| Dispatcher::new(&mut states, farm.options).on(peer).biased(biased).keeping(&mut kept));
+                let dispatcher = here.then(|| {
+                    Dispatcher::new(&mut states, farm.options)
+                        .on(peer)
+                        .biased(biased)
+                        .with_parts(parts)
+                        .keeping(&mut kept)
+                });
                 let did = node(peer, &mut link, dispatcher, clock);
                 worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });
         }
         let (mut states, mut kept) = (vec![NodeState::default(); peers], vec![0; kept_words]);
         let dispatcher = (dispatcher_at == HOST)
-            .then(|| Dispatcher::new(&mut states, farm.options).biased(biased).keeping(&mut kept));
+            .then(|| Dispatcher::new(&mut states, farm.options).biased(biased).with_parts(parts).keeping(&mut kept));
         let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
         let server = PageServer::new(&mut asked, &mut turns);
         let outcome = run_master(&mut master, dispatcher, server, pages, &mut host_link, &mut { clock }, watch);

@@ -60,8 +60,10 @@ pub struct Budget<'a> {
     pub page_memory: Option<u64>,
     /// The node that owns each page.
     pub owners: &'a [u16],
-    /// Pages of others that each node has in its light cache, node 1's first; or none.
-    pub light_cache: &'a [Vec<u32>],
+    /// Pages of others that each node has from the beginning, node 1's first; or none.
+    pub copies: &'a [Vec<u32>],
+    /// Where each node's part of the picture begins, in tiles, node 1's first, and the last one ends; none if all are of as many.
+    pub parts: &'a [u32],
 }
 
 /// Why there is no result.
@@ -221,14 +223,14 @@ pub fn simulate_spoiled(
             plan = plan.with_page_memory(bytes, farm.nodes, owned_max);
         }
         let memory = budget.page_memory.map_or(budget.memory, |_| plan.sum().total_bytes());
-        plan = plan.with_light_cache(light_cache_bytes(&entries, budget.light_cache), memory)?;
+        plan = plan.with_light_cache(light_cache_bytes(&entries, budget.copies), memory)?;
     }
     scene.resident.directory.entries = &entries;
     let mut up = vec![0; scene.resident.directory.nodes.len() + entries.len()];
     parents(scene.resident.directory.nodes, &mut up);
     let (settings, dispatcher) = (farm.settings, farm.dispatcher);
-    let light_cache = farm.budget.map_or(&[][..], |budget| budget.light_cache);
-    let shared = worker::Shared { scene, scene_hash, up: &up, pages, light_cache, plan, settings, dispatcher };
+    let copies = farm.budget.map_or(&[][..], |budget| budget.copies);
+    let shared = worker::Shared { scene, scene_hash, up: &up, pages, copies, plan, settings, dispatcher };
     let mut memories: Vec<worker::Memory> = (1..peers).map(|_| worker::memory(&plan)).collect();
     let workers = (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
     let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);

@@ -28,7 +28,7 @@ pub(crate) struct Shared<'s> {
     /// The bytes of each page.
     pub pages: &'s [&'s [u8]],
     /// What each node has of others' pages for good, node 1's first.
-    pub light_cache: &'s [Vec<u32>],
+    pub copies: &'s [Vec<u32>],
     pub plan: Plan,
     pub settings: Settings,
     pub dispatcher: Peer,
@@ -43,7 +43,7 @@ pub(crate) struct Worker<'s> {
 impl<'s> Worker<'s> {
     /// It runs the portable walk, whatever the processor has: what it counts is the same everywhere (DESIGN, law 7).
     pub fn new(shared: &Shared<'s>, me: Peer, memory: &'s mut Memory) -> Self {
-        let Shared { scene, scene_hash, up, pages, light_cache, plan, settings, dispatcher } = *shared;
+        let Shared { scene, scene_hash, up, pages, copies, plan, settings, dispatcher } = *shared;
         let (memory, mut cache) =
             plan.charge(&mut Arena::new(memory), &scene, up, pages).expect("the sum of its terms");
         for (page, entry) in (0..).zip(scene.resident.directory.entries) {
@@ -51,8 +51,8 @@ impl<'s> Worker<'s> {
                 cache.put(page, entry.bytes as usize);
             }
         }
-        let lights = light_cache.get(usize::from(me) - 1).filter(|_| !plan.holds_all);
-        for &page in lights.into_iter().flatten() {
+        let copies = copies.get(usize::from(me) - 1).filter(|_| !plan.holds_all);
+        for &page in copies.into_iter().flatten() {
             cache.put(page, scene.resident.directory.entries[page as usize].bytes as usize);
         }
         let settings = plan.settings(settings);

@@ -61,7 +61,7 @@ pub(crate) struct World<'a, 'm, 's> {
     progress: (u64, u32),
 }
 
-impl<'a, 'm, 's> World<'a, 'm, 's> {
+impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
     pub fn new(
         farm: &'a Farm<'a>,
         plan: Plan,
@@ -78,7 +78,8 @@ impl<'a, 'm, 's> World<'a, 'm, 's> {
             master,
             dispatcher: Dispatcher::new(states, farm.options)
                 .on(farm.dispatcher)
-                .biased(farm.settings.policy != Policy::DemandDriven),
+                .biased(farm.settings.policy != Policy::DemandDriven)
+                .with_parts(farm.budget.map_or(&[], |budget| budget.parts)),
             server,
             pages,
             seats: workers
