@@ -6,9 +6,10 @@
 
 use hybray::build;
 use hybray::model;
-use hybray::partition::{LightCaches, Voxels, light_caches, owners};
+use hybray::partition::{Voxels, light_caches, owners};
 use hybray::prepare::Prepared;
 use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
+use hybray_scene::lines_for;
 use hybray_scheduler::policy::{LinkCost, Policy};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
@@ -75,6 +76,15 @@ enum Fault {
     Lose { node: u16, at_ns: u64, notice_ns: u64 },
 }
 
+/// What nodes have, and where pages and tiles are to begin with.
+#[derive(Debug)]
+struct Given {
+    memory: u64,
+    owners: Vec<u16>,
+    copies: Vec<Vec<u32>>,
+    parts: Vec<u32>,
+}
+
 /// What a seed draws beside its scene.
 #[derive(Debug)]
 struct Draw {
@@ -83,8 +93,8 @@ struct Draw {
     dispatcher: u16,
     settings: Settings,
     options: Options,
-    /// Bytes, who owns which page, and light caches; every node has everything if there are none.
-    budget: Option<(u64, Vec<u16>, LightCaches)>,
+    /// Every node has everything if there is none.
+    budget: Option<Given>,
     delays: Option<(u64, u64)>,
     faults: Vec<Fault>,
 }
@@ -165,13 +175,7 @@ impl Draw {
         draw
     }
 
-    fn budget(
-        random: &mut Random,
-        drawn: &Drawn,
-        scene: &Scene<'_>,
-        nodes: u16,
-        policy: Policy,
-    ) -> (u64, Vec<u16>, LightCaches) {
+    fn budget(random: &mut Random, drawn: &Drawn, scene: &Scene<'_>, nodes: u16, policy: Policy) -> Given {
         let count = drawn.prepared.packed.pages();
         let any = |random: &mut Random| 1 + random.below(usize::from(nodes)) as u16;
         let only = any(random);
@@ -189,8 +193,31 @@ impl Draw {
         let plan = planned(scene, &owners, nodes, memory, policy).expect("it is enough");
         let room = plan.light_cache_room(memory);
         let asked = one_of(random, &[None, Some(0), Some(room / 2), Some(room)]);
-        let (_, caches) = light_caches(plan, memory, asked, policy, scene, &owners, nodes).expect("there is room");
-        (memory, owners, caches)
+        let (plan, caches) = light_caches(plan, memory, asked, policy, scene, &owners, nodes).expect("there is room");
+        let mut copies = caches.pages;
+        if random.below(2) == 0 {
+            // Any pages that they have not, as far as there is room: what a pilot finds is no better for that.
+            copies.resize(usize::from(nodes), Vec::new());
+            let entries = scene.resident.directory.entries;
+            for (node, copies) in (1..).zip(&mut copies) {
+                let mut room = plan.light_cache_room(memory);
+                for _ in 0..random.below(20) {
+                    let page = random.below(count);
+                    let bytes = 64 * lines_for(entries[page].bytes as usize) as u64;
+                    if owners[page] != node && !copies.contains(&(page as u32)) && bytes <= room {
+                        room -= bytes;
+                        copies.push(page as u32);
+                    }
+                }
+            }
+        }
+        let mut parts: Vec<u32> = (0..usize::from(nodes) + 1).map(|_| random.below(40) as u32).collect();
+        parts.sort_unstable();
+        parts[0] = 0;
+        if random.below(2) == 0 {
+            parts.clear();
+        }
+        Given { memory, owners, copies, parts }
     }
 
     /// Faults at moments of the picture: most take as long as it does, or are over before it begins.
@@ -219,12 +246,12 @@ impl Draw {
     }
 
     fn run(&self, drawn: &Drawn, scene: &Scene<'_>, pages: &[&[u8]], frame: &Frame) -> Simulated {
-        let budget = self.budget.as_ref().map(|(memory, owners, caches)| Budget {
-            memory: *memory,
+        let budget = self.budget.as_ref().map(|given| Budget {
+            memory: given.memory,
             page_memory: None,
-            owners,
-            copies: &caches.pages,
-            parts: &[],
+            owners: &given.owners,
+            copies: &given.copies,
+            parts: &given.parts,
         });
         let Self { nodes, dispatcher, options, settings, .. } = *self;
         let farm = Farm { machine: &self.machine, nodes, dispatcher, options, settings, budget };
@@ -326,7 +353,7 @@ fn expect(run: &Simulated, draw: &Draw, film: u64, expected: &Counts, closeness:
         assert_eq!(node.exchange.nonsense, 0, "node {}", number + 1);
     }
     closeness.look(run, draw);
-    if let Some((memory, ..)) = draw.budget {
+    if let Some(Given { memory, .. }) = draw.budget {
         assert!(run.plan.sum().total_bytes() <= memory, "over budget: {:?}", run.plan);
     }
     if !lost {

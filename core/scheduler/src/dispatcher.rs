@@ -271,13 +271,16 @@ impl<'m> Dispatcher<'m> {
     /// Tiles that a node has not begun, for one that has nothing to do: they are that node's part of the picture now.
     fn back(&mut self, from: Peer, with: Peer, first: u32, count: u32) {
         let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        // Its last run then: another may be on its way there since.
         let is_tail = |run: &&mut Run| {
             count > 0 && count <= run.count && run.epoch == 0 && first == run.first + (run.count - count)
         };
-        let Some(run) = node.runs.back_mut().filter(is_tail) else { return };
+        let Some(run) = node.runs.iter_mut().find(is_tail) else { return };
         run.count -= count;
-        if run.count == 0 {
-            node.runs.pop_back();
+        for _ in 0..node.runs.len() {
+            if let Some(run) = node.runs.pop_front().filter(|run| run.count > 0) {
+                let _ = node.runs.push_back(run);
+            }
         }
         if let Some(helped) = self.nodes.get_mut(usize::from(with)).filter(|node| node.helping == Some(from)) {
             helped.helping = None;

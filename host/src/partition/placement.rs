@@ -103,7 +103,7 @@ mod tests {
                 continue;
             };
             placed += 1;
-            let before: Vec<Vec<u32>> = if random.below(2) == 0 {
+            let before: Vec<Vec<u32>> = if pages.is_empty() || random.below(2) == 0 {
                 Vec::new()
             } else {
                 (0..nodes)

@@ -480,3 +480,27 @@ fn parts_are_given_out_by_halves() {
     assert_eq!(wire.take(), [(1, 3, 1, 0)]);
     assert!(dispatcher.left() > 0);
 }
+
+/// What comes back is known by its tiles: another run may have been sent there since.
+#[test]
+fn what_comes_back_may_be_of_the_run_before() {
+    for (first, count, ends) in [(2, 2, &[(0, 2), (4, 4)][..]), (0, 4, &[(4, 4)])] {
+        let mut nodes = vec![NodeState::default(); 3];
+        let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
+        let mut wire = Wire::new();
+        dispatcher.handle(HOST, &begin(8), 0);
+        dispatcher.handle(1, &HELLO, 0);
+        dispatcher.poll(&mut wire, 0);
+        assert_eq!(wire.take(), [(1, 0, 4, 0), (1, 4, 4, 0)]);
+        dispatcher.handle(1, &Message::Back { with: 2, first, count }, 1);
+        dispatcher.handle(2, &HELLO, 1);
+        dispatcher.poll(&mut wire, 1);
+        assert_eq!(wire.take()[0], (2, first, count, 0));
+        dispatcher.handle(2, &Message::Done { first, count, nanoseconds: 5 }, 2);
+        for &(first, count) in ends {
+            assert!(!dispatcher.is_idle());
+            dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }, 2);
+        }
+        assert!(dispatcher.is_idle());
+    }
+}
