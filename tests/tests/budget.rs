@@ -6,7 +6,7 @@ use hybray::model;
 use hybray::partition::light_caches;
 use hybray::prepare::Prepared;
 use hybray_native::{Budget, DispatcherAt, Farm, plan, trace, trace_within};
-use hybray_scheduler::policy::Policy;
+use hybray_scheduler::policy::{Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings, Sizes};
 use hybray_tests::{Random, kernels, scene, within};
 use hybray_tracer::Scene;
@@ -40,26 +40,30 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
             for memory in [least, least + least / 2] {
                 let dispatcher = [DispatcherAt::Host, DispatcherAt::Node][random.below(2)];
                 let steps = [16, 4096][random.below(2)];
-                let settings = Settings { policy, steps, ..Settings::default() };
+                let subhosts = [None, Some(0), Some(1), Some(nodes / 2)][random.below(4)];
+                let settings = Settings { policy, steps, subhosts, ..Settings::default() };
+                let count = Tiles::PixelCount { pixels: 300 };
+                let tiles = [Tiles::Dynamic, Tiles::Static, count][random.below(3)];
+                let options = Options { tiles, take_over: random.below(2) == 0, ..Options::default() };
+                let barred: Vec<bool> = (0..=nodes).map(|_| random.below(3) == 0).collect();
                 let plan = planned(&scene, &owners, nodes, memory, policy).expect("it is enough");
                 let room = plan.light_cache_room(memory);
                 let asked = [None, Some(0), Some(room / 2), Some(room)][random.below(4)];
                 let (plan, caches) = light_caches(plan, memory, asked, policy, &scene, &owners, nodes).expect("room");
                 assert!(plan.sum().total_bytes() <= memory, "{plan:?}");
                 light_pages += caches.pages.iter().map(Vec::len).sum::<usize>();
-                let (pages, light_cache) = (&pages, &caches.pages);
-                let budget = Budget { memory, owners: &owners, pages, copies: light_cache, parts: &[], settings };
+                let (pages, copies) = (&pages, &caches.pages);
+                let budget = Budget { memory, owners: &owners, pages, copies, parts: &[], settings, barred: &barred };
+                let farm = Farm { options, ..farm(nodes, dispatcher) };
                 let what = || {
                     let lights = caches.bytes;
                     format!(
-                        "{name}, seed {seed}, {nodes} nodes, {dispatcher:?}, {memory} bytes, {lights} of them in \
-                             light caches, {settings:?}"
+                        "{name}, seed {seed}, {farm:?}, {memory} bytes, {lights} of them in light caches, {settings:?}, \
+                         no tiles for {barred:?}"
                     )
                 };
-                let traced = within(60, what, || {
-                    let farm = farm(nodes, dispatcher);
-                    trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut |_| true)
-                });
+                let traced =
+                    within(60, what, || trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut |_| true));
                 let traced = traced.unwrap_or_else(|e| panic!("{}: {e}", what())).expect("a picture");
                 assert_eq!((traced.outcome, traced.film), (Outcome::Finished, expected.film), "{}", what());
                 assert_eq!(counts(&traced.nodes), counts(&expected.nodes), "{}", what());

@@ -7,6 +7,7 @@ use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
 use hybray_native::{DispatcherAt, Farm};
 use hybray_scheduler::Options;
+use hybray_scheduler::policy::Tiles;
 use hybray_tests::{Random, drawn, scene};
 
 /// Farms that a picture is drawn on, beside the one that it is compared with.
@@ -39,7 +40,7 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
         nodes: 1,
         kernels: Kernels::Portable,
         dispatcher: DispatcherAt::Host,
-        options: Options { spread: Some(1.0), atomic: Some(1) },
+        options: Options { spread: Some(1.0), atomic: Some(1), ..Options::default() },
     };
     let expected = drawn(&prepared[0], &wanted, &alone, name);
     assert!(expected.counts.hits > 0 && expected.counts.shadow > 0, "{name}: {expected:?}");
@@ -51,8 +52,9 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
     let dispatchers = deck(random, &[DispatcherAt::Host, DispatcherAt::Node]);
     let kernels = deck(random, &[Kernels::Portable, Kernels::detect()]);
     let trees = deck(random, &[0, 1, 2, 3]);
+    let tiles = deck(random, &[Tiles::Dynamic, Tiles::Static, Tiles::PixelCount { pixels: 300 }]);
     for i in 0..DRAWS {
-        let options = Options { spread: spreads[i], atomic: atomics[i] };
+        let options = Options { spread: spreads[i], atomic: atomics[i], tiles: tiles[i], take_over: i % 3 > 0 };
         let farm = Farm { nodes: nodes[i], kernels: kernels[i], dispatcher: dispatchers[i], options };
         let tree = &prepared[trees[i]];
         let what = format!("{name} {size:?} {filter}, tree {} of {} pages, {farm:?}", trees[i], tree.packed.pages());

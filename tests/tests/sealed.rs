@@ -88,9 +88,10 @@ fn nothing_is_allocated_after_the_seal() {
     for name in ["spd:balls:2", "spd:mount:2"] {
         let alone = drawn(name, 1, Settings::default(), None);
         assert_eq!(alone.outcome, Some(Outcome::Finished), "{name}");
-        for (_, policy) in Policy::ALL {
-            let settings = Settings { policy, granularity: 30, deadline_ns: 50_000, ..Settings::default() };
-            let what = || format!("{name}, {policy:?}");
+        for (at, (_, policy)) in Policy::ALL.into_iter().enumerate() {
+            let subhosts = [None, Some(1)][at % 2];
+            let settings = Settings { policy, granularity: 30, deadline_ns: 50_000, subhosts, ..Settings::default() };
+            let what = || format!("{name}, {settings:?}");
             let came = within(60, what, || drawn(name, 3, settings, None));
             assert_eq!(came, Came { allocations: 0, ..alone }, "{}", what());
         }
@@ -139,7 +140,7 @@ fn message(random: &mut Random, frame: u16) -> Message {
     let bits = random.bits();
     let (small, word) = (random.below(8), bits as u32);
     let number = if random.below(2) == 0 { small as u32 } else { word };
-    match random.below(14) {
+    match random.below(16) {
         0..=3 => Message::Rays { rays: small as u16, shadows: random.below(8) as u16, load: frame },
         4 => Message::Took { taken: bits & 1 == 0, load: word as u16 },
         5 => Message::Partials { count: 1 + small as u16 },
@@ -150,6 +151,8 @@ fn message(random: &mut Random, frame: u16) -> Message {
         10 => Message::Tiles { first: number, count: word, epoch: 0 },
         11 => Message::Done { first: number, count: 1, nanoseconds: bits },
         12 => Message::Finished { tile: u32::MAX },
+        13 => Message::Clip { first: number, count: small as u8 },
+        14 => Message::Cliplist { first: number, pages: small as u8 },
         _ => [Message::Stop, Message::Again { tile: number, epoch: NO_EPOCH }][random.below(2)],
     }
 }
@@ -196,8 +199,9 @@ fn what_a_stranger_sends_changes_nothing() {
         let alone = drawn(name, 1, Settings::default(), None);
         for seed in 0..12 {
             let policy = Policy::ALL[seed as usize % 4].1;
-            let settings = Settings { policy, granularity: 30, deadline_ns: 50_000, steps: 64, ..Settings::default() };
-            let what = || format!("{name}, {policy:?}, seed {seed}");
+            let usual = Settings { policy, granularity: 30, deadline_ns: 50_000, ..Settings::default() };
+            let settings = Settings { steps: 64, subhosts: [None, Some(1)][seed as usize / 4 % 2], ..usual };
+            let what = || format!("{name}, {settings:?}, seed {seed}");
             let random = &mut Random(seed);
             let came = within(60, what, || drawn(name, 3, settings, Some(&mut |post| molest(random, 3, post))));
             assert_eq!((came.outcome, came.film), (Some(Outcome::Finished), alone.film), "{}", what());

@@ -10,7 +10,7 @@ use hybray::partition::{Voxels, light_caches, owners};
 use hybray::prepare::Prepared;
 use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
 use hybray_scene::lines_for;
-use hybray_scheduler::policy::{LinkCost, Policy};
+use hybray_scheduler::policy::{LinkCost, Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
     Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_spoiled,
@@ -51,7 +51,7 @@ impl Drawn {
                 nodes: 1,
                 kernels: kernels(),
                 dispatcher: DispatcherAt::Host,
-                options: Options { spread: Some(1.0), atomic: None },
+                options: Options { spread: Some(1.0), atomic: None, ..Options::default() },
             };
             let frames = SIZES.map(|(size, samples, depth)| {
                 let (size, spp, depth) = (Some(size), Some(samples), Some(depth));
@@ -95,6 +95,8 @@ struct Draw {
     options: Options,
     /// Every node has everything if there is none.
     budget: Option<Given>,
+    /// Nodes that are given no tiles, where they have a budget.
+    barred: Vec<bool>,
     delays: Option<(u64, u64)>,
     faults: Vec<Fault>,
 }
@@ -155,7 +157,8 @@ impl Draw {
             link: one_of(random, &[usual.link, LinkCost { message_ns: 1, byte_ps: 1 }]),
             ..usual
         };
-        let options = Options { spread: one_of(random, &[None, Some(1.0), Some(8.0)]), atomic: None };
+        let options =
+            Options { spread: one_of(random, &[None, Some(1.0), Some(8.0)]), atomic: None, ..Options::default() };
         let budget = (random.below(8) > 0).then(|| Self::budget(random, drawn, scene, nodes, policy));
         let message_ns = usual.deadline_ns / 8;
         let delays = (random.below(2) == 0).then(|| (random.bits(), message_ns * one_of(random, &[1, 10])));
@@ -166,13 +169,26 @@ impl Draw {
             settings,
             options,
             budget,
+            barred: Vec::new(),
             delays,
             faults: Vec::new(),
         };
         if faulty {
             draw.spoil(random, message_ns);
         }
+        draw.give_out(random);
         draw
+    }
+
+    /// When nodes are given tiles, which of them, and who clips for them.
+    fn give_out(&mut self, random: &mut Random) {
+        let count = Tiles::PixelCount { pixels: one_of(random, &[1, 200, 4096]) };
+        let tiles = one_of(random, &[Tiles::Dynamic, Tiles::Dynamic, Tiles::Static, count]);
+        self.settings.subhosts =
+            one_of(random, &[None, None, Some(0), Some(1), Some(self.nodes / 2), Some(self.nodes)]);
+        self.options = Options { tiles, take_over: random.below(4) > 0, ..self.options };
+        let some = random.below(2) == 0;
+        self.barred = (0..=self.nodes).map(|_| some && random.below(2) == 0).collect();
     }
 
     fn budget(random: &mut Random, drawn: &Drawn, scene: &Scene<'_>, nodes: u16, policy: Policy) -> Given {
@@ -252,6 +268,7 @@ impl Draw {
             owners: &given.owners,
             copies: &given.copies,
             parts: &given.parts,
+            barred: &self.barred,
         });
         let Self { nodes, dispatcher, options, settings, .. } = *self;
         let farm = Farm { machine: &self.machine, nodes, dispatcher, options, settings, budget };

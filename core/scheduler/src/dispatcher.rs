@@ -6,15 +6,24 @@
 //! The rule bounds the imbalance only if no run takes more than T times as long as another, and if nobody holds back
 //! what others could do. So what a node has in hand is kept short: at most twice what it has proven to be able to, a
 //! short run behind a long one, and none behind another where others would be through with it first.
+//!
+//! All this is dynamic scheduling. The 1995 report's others are beside it ([`Tiles`]): by a count of the pixels that come
+//! back to the host, where no word of a node is heard; and static, where each node's run is its part of the picture.
 
 use crate::chunk::{Shares, chunk};
 use crate::master::NO_MORE;
+use crate::policy::{Hand, Tiles, gives, missing};
 use crate::send;
 use hybray_link::{HOST, Link, Peer};
 use hybray_wire::Message;
 
 /// Runs that a node has at a time: one in work, and the next.
 const AHEAD: usize = 2;
+/// Runs that a node has at a time at most, where pixels are counted.
+pub(crate) const RUNS_MAX: usize = 8;
+/// A node that is done with its runs, but some of whose tiles have not come back for so long, nanoseconds, is given
+/// others all the same: a frame that is lost must not keep it waiting for ever.
+const SILENCE: u64 = 10_000_000_000;
 /// Runs that wait to be given out again.
 const AGAIN_MAX: usize = 64;
 /// T before anything is known, and the least that is learned (Pandzic and Magnenat-Thalmann, by way of POV||Ray's
@@ -30,12 +39,24 @@ const HELPERS: u32 = 2;
 const OVERHEAD_FACTOR: u64 = 2;
 
 /// What may be chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// T; learned if `None`.
     pub spread: Option<f32>,
     /// Least tiles of a run; learned if `None`.
     pub atomic: Option<u32>,
+    /// When a node is given tiles. Pixels come back to the host: for a dispatcher elsewhere a count of them is
+    /// [`Tiles::Dynamic`].
+    pub tiles: Tiles,
+    /// At the end of a picture, nodes that have nothing to do are given some of the others' rays and tiles: never where
+    /// tiles are divided once for all.
+    pub take_over: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { spread: None, atomic: None, tiles: Tiles::Dynamic, take_over: true }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,15 +64,31 @@ struct Run {
     first: u32,
     count: u32,
     epoch: u16,
+    /// Tiles of it that have come back, if pixels are counted; and whether its node has said that it is done.
+    back: u32,
+    done: bool,
 }
 
-type Runs = heapless::Deque<Run, AHEAD>;
+impl Run {
+    const fn new(first: u32, count: u32, epoch: u16) -> Self {
+        Self { first, count, epoch, back: 0, done: false }
+    }
+
+    /// Something of it is still to be heard.
+    const fn stays(&self) -> bool {
+        self.back < self.count || !self.done
+    }
+}
+
+type Runs = heapless::Deque<Run, RUNS_MAX>;
 
 /// What the dispatcher knows of a node: one for each peer is lent to it.
 #[derive(Clone, Debug, Default)]
 pub struct NodeState {
     here: bool,
     lost: bool,
+    /// It is given no tiles.
+    barred: bool,
     /// Has been told that nothing is left.
     told: bool,
     /// What is left of its part of the picture.
@@ -79,7 +116,21 @@ pub struct NodeState {
 
 impl NodeState {
     fn in_hand(&self) -> u32 {
-        self.runs.iter().map(|run| run.count).sum()
+        self.runs.iter().map(|run| run.count - run.back).sum()
+    }
+
+    /// Drops the runs that `stays` does not hold for.
+    fn keep(&mut self, stays: impl Fn(&Run) -> bool) {
+        for _ in 0..self.runs.len() {
+            if let Some(run) = self.runs.pop_front().filter(&stays) {
+                let _ = self.runs.push_back(run);
+            }
+        }
+    }
+
+    /// It can be given tiles.
+    fn is_open(&self) -> bool {
+        self.here && !self.barred
     }
 
     /// Tiles of its part that were never given out.
@@ -89,9 +140,9 @@ impl NodeState {
 }
 
 /// A bit for each tile.
-struct Tiles<'m>(&'m mut [u64]);
+struct TileSet<'m>(&'m mut [u64]);
 
-impl Tiles<'_> {
+impl TileSet<'_> {
     fn has(&self, tile: u32) -> bool {
         self.0.get(tile as usize / 64).is_some_and(|word| word >> (tile % 64) & 1 == 1)
     }
@@ -107,7 +158,7 @@ impl Tiles<'_> {
 struct Crew {
     /// Tiles a nanosecond; 0 if nothing is known.
     mean_rate: f32,
-    /// Nodes that are here.
+    /// Nodes that are here and may be given tiles.
     here: u32,
     /// Tiles in their hands.
     in_hand: u32,
@@ -135,7 +186,7 @@ pub struct Dispatcher<'m> {
     /// Tiles to be given out: all, but for those that are kept.
     wanted: u32,
     /// Tiles that were finished before.
-    kept: Tiles<'m>,
+    kept: TileSet<'m>,
     /// Each node begins in its own part of the picture.
     biased: bool,
     /// Where these parts begin, and where the last ends, if they are not of equal numbers of tiles.
@@ -163,7 +214,7 @@ impl<'m> Dispatcher<'m> {
             options,
             tiles: 0,
             wanted: 0,
-            kept: Tiles(&mut []),
+            kept: TileSet(&mut []),
             biased: false,
             bounds: &[],
             me: HOST,
@@ -201,7 +252,15 @@ impl<'m> Dispatcher<'m> {
     #[must_use]
     pub fn keeping(self, kept: &'m mut [u64]) -> Self {
         kept.fill(0);
-        Self { kept: Tiles(kept), ..self }
+        Self { kept: TileSet(kept), ..self }
+    }
+
+    /// Nodes that are to be given no tiles, while any other is left: entry 0 is the host's.
+    #[must_use]
+    pub fn barring(mut self, barred: &[bool]) -> Self {
+        self.nodes.iter_mut().zip(barred).for_each(|(node, &barred)| node.barred = barred);
+        self.open_if_none();
+        self
     }
 
     /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
@@ -218,7 +277,9 @@ impl<'m> Dispatcher<'m> {
                     node.here = !node.lost;
                 }
             }
+            Message::Done { first, count, .. } if self.counts_pixels() => self.ended(from, first, count, now),
             Message::Done { first, count, nanoseconds } => self.done(from, first, count, nanoseconds, now),
+            Message::Contributions { tile, .. } if self.counts_pixels() => self.came_back(from, tile, now),
             Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
             Message::Back { with, first, count } => self.back(from, with, first, count),
             Message::Idle { given } => {
@@ -234,19 +295,67 @@ impl<'m> Dispatcher<'m> {
 
     /// A peer is gone: what it had is given to others, under a new epoch.
     pub fn lost(&mut self, peer: Peer) {
+        let is_static = self.options.tiles == Tiles::Static;
         if let Some(node) = self.nodes.get_mut(usize::from(peer)) {
             node.here = false;
             node.lost = true;
+            // Its part of the picture was for nobody else.
+            if is_static && node.left() > 0 && node.runs.push_back(Run::new(node.next, node.end - node.next, 0)).is_ok()
+            {
+                (node.next, node.kept) = (node.end, 0);
+            }
             for run in node.runs.iter_mut() {
-                run.epoch = run.epoch.saturating_add(1);
+                *run = Run::new(run.first, run.count, run.epoch.saturating_add(1));
             }
         }
+        self.open_if_none();
+    }
+
+    /// Somebody must draw the picture, whatever was to be.
+    fn open_if_none(&mut self) {
+        if self.nodes.iter().skip(1).all(|node| node.lost || node.barred) {
+            self.nodes.iter_mut().for_each(|node| node.barred = false);
+        }
+    }
+
+    fn is_divided(&self) -> bool {
+        self.biased || self.options.tiles == Tiles::Static
+    }
+
+    fn counts_pixels(&self) -> bool {
+        matches!(self.options.tiles, Tiles::PixelCount { .. })
+    }
+
+    /// Where pixels are counted, the end of a run is heard so that the picture ends, and a node's queue does not overflow.
+    fn ended(&mut self, from: Peer, first: u32, count: u32, now: u64) {
+        let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        let is = |run: &&mut Run| !run.done && (run.first, run.count) == (first, count);
+        if let Some(run) = node.runs.iter_mut().find(is) {
+            run.done = true;
+            node.since = now;
+            node.keep(Run::stays);
+        }
+    }
+
+    /// A tile of a node has come back.
+    fn came_back(&mut self, from: Peer, tile: u32, now: u64) {
+        let Some(node) = self.nodes.get_mut(usize::from(from)).filter(|node| node.here) else { return };
+        let is = |run: &&mut Run| tile.wrapping_sub(run.first) < run.count && run.back < run.count;
+        let Some(run) = node.runs.iter_mut().find(is) else { return };
+        run.back += 1;
+        (node.since, node.asked) = (now, 0);
+        // Runs do not end in their order: some tile's rays may be long under way.
+        node.keep(Run::stays);
     }
 
     /// A tile that the film wants again, or the end of their list. The picture is not idle in between: each node would
     /// report before all is done, and nobody could tell that report from the next.
     fn again(&mut self, tile: u32, epoch: u16) {
-        self.nodes.iter_mut().for_each(|node| node.told = false);
+        for node in self.nodes.iter_mut() {
+            node.told = false;
+            // Everything has come back that ever will.
+            node.keep(|run| !run.done);
+        }
         if tile == NO_MORE {
             self.gathering = false;
         }
@@ -257,7 +366,7 @@ impl<'m> Dispatcher<'m> {
         let adjacent = |run: &Run| run.first + run.count == tile && run.epoch == epoch;
         if let Some(run) = self.again.back_mut().filter(|run| adjacent(run)) {
             run.count += 1;
-        } else if self.again.push_back(Run { first: tile, count: 1, epoch }).is_err()
+        } else if self.again.push_back(Run::new(tile, 1, epoch)).is_err()
             && let Some(run) = self.again.back_mut()
         {
             // Where there is no room, the tiles in between are traced for nothing: the film has them and takes no more.
@@ -277,11 +386,7 @@ impl<'m> Dispatcher<'m> {
         };
         let Some(run) = node.runs.iter_mut().find(is_tail) else { return };
         run.count -= count;
-        for _ in 0..node.runs.len() {
-            if let Some(run) = node.runs.pop_front().filter(|run| run.count > 0) {
-                let _ = node.runs.push_back(run);
-            }
-        }
+        node.keep(|run| run.count > 0);
         if let Some(helped) = self.nodes.get_mut(usize::from(with)).filter(|node| node.helping == Some(from)) {
             helped.helping = None;
             self.nodes[usize::from(from)].helpers -= 1;
@@ -294,7 +399,7 @@ impl<'m> Dispatcher<'m> {
                 let part = &mut self.nodes[to];
                 (part.next, part.end, part.kept) = (first, first + count, 0);
             }
-            None => drop(self.again.push_back(Run { first, count, epoch: 0 })),
+            None => drop(self.again.push_back(Run::new(first, count, 0))),
         }
     }
 
@@ -321,7 +426,7 @@ impl<'m> Dispatcher<'m> {
 
     /// How many nodes share the picture: also those that have not been heard of yet, or the first would be given all.
     fn sharing(&self) -> u32 {
-        (self.nodes.iter().skip(1).filter(|n| !n.lost).count() as u32).max(1)
+        (self.nodes.iter().skip(1).filter(|n| !n.lost && !n.barred).count() as u32).max(1)
     }
 
     /// T as it is now.
@@ -364,7 +469,7 @@ impl<'m> Dispatcher<'m> {
             && self.left() == 0
             && self.again.is_empty()
             && !self.gathering
-            && self.nodes.iter().all(|node| node.runs.is_empty())
+            && self.nodes.iter().flat_map(|node| node.runs.iter()).all(|run| run.done)
     }
 
     /// What is at work now. Bounded: all nodes, once.
@@ -375,7 +480,7 @@ impl<'m> Dispatcher<'m> {
             self.nodes.iter().filter(known).fold((0.0, 0.0), |(sum, count), n| (sum + rate(n), count + 1.0));
         let mut crew = Crew {
             mean_rate: if count > 0.0 { sum / count } else { 0.0 },
-            here: self.nodes.iter().filter(|n| n.here).count() as u32,
+            here: self.nodes.iter().filter(|n| n.is_open()).count() as u32,
             in_hand: 0,
             rates: 0.0,
             orphans: self.nodes.iter().any(|n| n.lost && !n.runs.is_empty()),
@@ -408,37 +513,60 @@ impl<'m> Dispatcher<'m> {
             return Some(run);
         }
         let left = self.left();
-        if left == 0 || self.ends_too_late(peer, crew, atomic) {
+        if left == 0 {
             return None;
         }
-        let node = &self.nodes[peer];
-        let count = if node.runs.front().is_some_and(|run| run.count > atomic) {
-            // It has enough to do. What comes behind need only last until the message after it is there: whatever it
-            // has in hand, nobody else can take.
-            atomic.min(left)
-        } else {
-            let shares = Shares {
-                tiles: left,
-                nodes: self.sharing(),
-                spread: self.spread(),
-                // A node that seems quick may have had the sky: none gets more than its part for that.
-                relative_rate: rate.min(1.0),
-                atomic,
-            };
-            // What a node can do is not known before it has done something, and only as far as it has.
-            let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
-            // Half of a part that is thought to take as long as all others at a time: what is not begun comes back if others
-            // have nothing to do before.
-            let half = node.left() / 2;
-            if shares.nodes == 1 {
-                left
-            } else if !self.bounds.is_empty() && half > atomic {
-                half
-            } else {
-                chunk(&shares).min(proven)
+        let count = match self.options.tiles {
+            // Its part, once: what is left otherwise is for nodes that are not here yet.
+            Tiles::Static => {
+                let node = &self.nodes[peer];
+                (node.left() > 0).then_some(node.end - node.next)?
             }
+            // Nobody to share with: there is nothing to wait for.
+            Tiles::PixelCount { .. } if self.sharing() == 1 => left,
+            Tiles::PixelCount { .. } => missing(self.options.tiles, &self.hand(peer, AHEAD)).max(atomic),
+            Tiles::Dynamic => self.dynamic(peer, crew, rate, atomic)?,
         };
         Some(self.cut(peer, count))
+    }
+
+    /// How many tiles come next where nodes say that they are done; none if others had better have them.
+    fn dynamic(&self, peer: usize, crew: &Crew, rate: f32, atomic: u32) -> Option<u32> {
+        if self.ends_too_late(peer, crew, atomic) {
+            return None;
+        }
+        let (node, left) = (&self.nodes[peer], self.left());
+        if node.runs.front().is_some_and(|run| run.count > atomic) {
+            // It has enough to do. What comes behind need only last until the message after it is there: whatever it
+            // has in hand, nobody else can take.
+            return Some(atomic.min(left));
+        }
+        let shares = Shares {
+            tiles: left,
+            nodes: self.sharing(),
+            spread: self.spread(),
+            // A node that seems quick may have had the sky: none gets more than its part for that.
+            relative_rate: rate.min(1.0),
+            atomic,
+        };
+        // What a node can do is not known before it has done something, and only as far as it has.
+        let proven = u32::try_from(node.tiles_done.saturating_mul(2)).unwrap_or(u32::MAX).max(atomic);
+        // Half of a part that is thought to take as long as all others at a time: what is not begun comes back if others
+        // have nothing to do before.
+        let half = node.left() / 2;
+        Some(if shares.nodes == 1 {
+            left
+        } else if !self.bounds.is_empty() && half > atomic {
+            half
+        } else {
+            chunk(&shares).min(proven)
+        })
+    }
+
+    /// What is known of a node that is meant to have so many runs now.
+    fn hand(&self, peer: usize, wanted: usize) -> Hand {
+        let node = &self.nodes[peer];
+        Hand { runs: node.runs.len(), tiles: node.in_hand(), wanted }
     }
 
     /// Tiles that were never given out.
@@ -446,18 +574,24 @@ impl<'m> Dispatcher<'m> {
         self.nodes.iter().map(NodeState::left).sum()
     }
 
-    /// Parts of the picture that tiles are given out from: one for all, which the host's entry holds, or one for each
-    /// node, so that it draws on the same pages for long (biased scheduling, the 1995 report's chapter 8).
+    /// Parts of the picture that tiles are given out from: one for all, which the host's entry holds, or one for each node
+    /// that may be given tiles, so that it draws on the same pages for long (biased scheduling, the 1995 report's chapter
+    /// 8), or is given no other ones (static scheduling, chapter 3).
     fn divide(&mut self) {
-        let parts = (self.nodes.len() as u32).saturating_sub(1).max(1);
-        let tiles = self.tiles;
-        let bounds = self.bounds;
+        let is_divided = self.is_divided();
+        let (parts, tiles) = (self.sharing(), self.tiles);
+        let bounds = if self.bounds.len() == parts as usize + 1 { self.bounds } else { &[] };
         let even = |part: u32| (u64::from(tiles) * u64::from(part) / u64::from(parts)) as u32 / 4 * 4;
         let bound = |part: u32| bounds.get(part as usize).map_or_else(|| even(part), |&bound| bound.min(tiles));
-        for (peer, node) in (0..).zip(self.nodes.iter_mut()) {
-            (node.next, node.end) = match (self.biased, peer) {
+        let mut part = 0;
+        for (peer, node) in self.nodes.iter_mut().enumerate() {
+            let has_part = peer > 0 && !node.lost && !node.barred;
+            (node.next, node.end) = match (is_divided, peer) {
                 (false, 0) => (0, tiles),
-                (true, 1..) => (bound(peer - 1), if peer == parts { tiles } else { bound(peer) }),
+                (true, _) if has_part => {
+                    part += 1;
+                    (bound(part - 1), if part == parts { tiles } else { bound(part) })
+                }
                 _ => (0, 0),
             };
             node.kept = (node.next..node.end).filter(|&tile| self.kept.has(tile)).count() as u32;
@@ -467,7 +601,7 @@ impl<'m> Dispatcher<'m> {
     /// A run of `count` tiles, or fewer up to a tile that is kept or where its part ends: from the node's own part or, where that is empty, the end of
     /// the one that has most left.
     fn cut(&mut self, peer: usize, count: u32) -> Run {
-        let own = if self.biased { peer } else { 0 };
+        let own = if self.is_divided() { peer } else { 0 };
         let others = self.nodes[own].left() == 0;
         let part =
             if others { (0..self.nodes.len()).rev().max_by_key(|&p| self.nodes[p].left()).unwrap_or(own) } else { own };
@@ -487,7 +621,7 @@ impl<'m> Dispatcher<'m> {
                 count = (part.end - count..part.end).rev().take_while(|&tile| !kept.has(tile)).count() as u32;
             }
             part.end -= count;
-            return Run { first: part.end, count, epoch: 0 };
+            return Run::new(part.end, count, 0);
         }
         if count >= 4 {
             count = (part.next + count).next_multiple_of(4).min(part.end) - part.next;
@@ -496,7 +630,7 @@ impl<'m> Dispatcher<'m> {
             count = (part.next..part.next + count).take_while(|&tile| !kept.has(tile)).count() as u32;
         }
         part.next += count;
-        Run { first: part.next - count, count, epoch: 0 }
+        Run::new(part.next - count, count, 0)
     }
 
     /// A part of what the film asks for again, or of what a lost node left: all of it could be too much for one at the
@@ -504,8 +638,8 @@ impl<'m> Dispatcher<'m> {
     fn second_hand(&mut self, crew: &Crew, atomic: u32) -> Option<Run> {
         let cut = |run: &mut Run| {
             let count = run.count.div_ceil(crew.here.max(1)).max(atomic).min(run.count);
-            let part = Run { count, ..*run };
-            *run = Run { first: run.first + count, count: run.count - count, ..*run };
+            let part = Run::new(run.first, count, run.epoch);
+            *run = Run::new(run.first + count, run.count - count, run.epoch);
             part
         };
         if let Some(run) = self.again.front_mut() {
@@ -530,7 +664,8 @@ impl<'m> Dispatcher<'m> {
         let count = self.nodes.len();
         for idle in 1..count {
             let node = &self.nodes[idle];
-            if !node.here || node.helping.is_some() || !node.runs.is_empty() {
+            // Some of what is shared are tiles: who is barred would have them given to others again, for ever.
+            if !node.is_open() || node.helping.is_some() || !node.runs.is_empty() {
                 continue;
             }
             // Whoever has been at a run for longest; each in turn if several ask. Who has no run any more may still have
@@ -552,11 +687,14 @@ impl<'m> Dispatcher<'m> {
         }
     }
 
-    /// Puts a run back where it came from: there is room for it there, or the rest of it.
-    fn give_back(&mut self, run: Run) {
+    /// Puts a run back where it came from, the node's own part before others': there is room for it there, or the rest of
+    /// it.
+    fn give_back(&mut self, run: Run, peer: usize) {
         let end = run.first + run.count;
-        let was_cut = |node: &&mut NodeState| run.epoch == 0 && (node.next == end || node.end == run.first);
-        if let Some(part) = self.nodes.iter_mut().find(was_cut) {
+        let was_cut = |node: &NodeState| run.epoch == 0 && (node.next == end || node.end == run.first);
+        let own = core::iter::once(if self.is_divided() { peer } else { 0 });
+        if let Some(part) = own.chain(0..self.nodes.len()).find(|&part| was_cut(&self.nodes[part])) {
+            let part = &mut self.nodes[part];
             if part.next == end {
                 part.next = run.first;
             } else {
@@ -567,9 +705,9 @@ impl<'m> Dispatcher<'m> {
         let lost = self.nodes.iter_mut().filter(|n| n.lost).map(|n| &mut n.runs);
         let rest = self.again.front_mut().into_iter().chain(lost.filter_map(|runs| runs.front_mut()));
         if let Some(rest) = rest.into_iter().find(|rest| rest.first == end && rest.epoch == run.epoch) {
-            *rest = Run { first: run.first, count: rest.count + run.count, ..*rest };
+            *rest = Run::new(run.first, rest.count + run.count, run.epoch);
         } else if self.again.push_front(run).is_err()
-            && let Some(node) = self.nodes.iter_mut().find(|n| n.lost && n.runs.len() < AHEAD)
+            && let Some(node) = self.nodes.iter_mut().find(|n| n.lost && !n.runs.is_full())
         {
             let _ = node.runs.push_front(run);
         }
@@ -580,17 +718,24 @@ impl<'m> Dispatcher<'m> {
         if self.tiles == 0 {
             return;
         }
+        if self.counts_pixels() && link.me() != HOST {
+            self.options.tiles = Tiles::Dynamic;
+        }
         let mut crew = self.crew();
         let all_here = crew.here == self.sharing();
         // First one each, then the second: a node's next run is no reason for another to have none.
         for wanted in 1..=AHEAD {
             for peer in 0..self.nodes.len() {
-                let node = &self.nodes[peer];
+                let node = &mut self.nodes[peer];
+                if now.saturating_sub(node.since) > SILENCE {
+                    node.keep(|run| !run.done);
+                }
                 // The first run is what a node waits for. Where the dispatcher is near, the second can wait until all have one.
                 let first = wanted == 1 || all_here || node.tiles_done > 0 || self.me == HOST;
                 let only_own = !self.bounds.is_empty() && self.me != HOST && peer == usize::from(self.me);
                 let has_no_part = only_own && node.left() == 0;
-                if !node.here || node.runs.len() >= wanted || !first || (has_no_part && crew.here > 1) {
+                let may = node.is_open() && !node.runs.is_full() && first && !(has_no_part && crew.here > 1);
+                if !may || !gives(self.options.tiles, &self.hand(peer, wanted)) {
                     continue;
                 }
                 let Some(run) = self.next_run(peer, &crew) else { continue };
@@ -602,7 +747,7 @@ impl<'m> Dispatcher<'m> {
                     node.first_sent_at.get_or_insert(now);
                     let _ = node.runs.push_back(run);
                 } else {
-                    self.give_back(run);
+                    self.give_back(run, peer);
                 }
             }
         }
@@ -615,7 +760,8 @@ impl<'m> Dispatcher<'m> {
         }
         // Who is to hear that nothing is left hears it first: what is shared must not take the room for it for ever.
         let told = !self.is_idle() || self.nodes.iter().all(|node| !node.here || node.told);
-        if told && self.left() == 0 && self.again.is_empty() && !self.gathering {
+        let takes_over = self.options.take_over && self.options.tiles != Tiles::Static;
+        if takes_over && told && self.left() == 0 && self.again.is_empty() && !self.gathering {
             self.share(link);
         }
     }

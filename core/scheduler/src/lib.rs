@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod chunk;
+mod clips;
 mod dispatcher;
 mod film;
 mod ledger;
@@ -18,6 +19,7 @@ pub mod rules;
 mod server;
 
 pub use chunk::{Shares, chunk};
+pub use clips::{Clipper, Unclipped};
 pub use dispatcher::{Dispatcher, NodeState, Options};
 pub use film::{Film, FilmError, Fixed, Step, TileState};
 pub use ledger::Balance;

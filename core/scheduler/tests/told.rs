@@ -1,5 +1,5 @@
 //! Whoever was to be given a share is told what became of it, and says when there is nothing to do again: else the
-//! dispatcher would never have anybody share with it again (decision 15).
+//! dispatcher would never have anybody share with it again (decision 15). And who waits for a cliplist is told it.
 
 #[path = "../examples/toy/mod.rs"]
 mod toy;
@@ -98,4 +98,50 @@ fn who_has_tiles_that_are_not_begun_gives_half_of_them_back() {
     let nothing = (2, Message::Rays { rays: 0, shadows: 0, load: 0 });
     check_with(5, &[run(0, 3, 1)], HOST, share, &[nothing, done(0, 3)]);
     check_with(5, &[run(0, 1, 0)], HOST, share, &[nothing, done(0, 1)]);
+}
+
+/// Something that happens to a node.
+type Happens<'a> = &'a dyn Fn(&mut Node<'_, '_, All<'_>>);
+
+/// Node 2 of two, whose cliplists its subhost makes: primary rays that it has traced after each of `events`.
+fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
+    let toy = Toy::new();
+    let pages = toy.open();
+    let limits = Limits { peers: 3, pages: 1, rays: 8, tiles: 4, partials: 4 };
+    let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
+    let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
+    let settings = Settings { subhosts: Some(subhosts), ..Settings::default() };
+    let mut node = Node::new(toy.scene(&pages), All(&pages), SCENE_HASH, Kernels::Portable, 2, HOST, settings, memory);
+    let mut link = Sent::default();
+    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
+    node.handle(HOST, &View { message: Message::Tiles { first: 0, count: 1, epoch: 0 }, body: &[] });
+    let mut turn = |node: &mut Node<'_, '_, All<'_>>| {
+        (0..3).for_each(|now| {
+            node.step(&mut || 0);
+            node.poll(&mut link, now);
+        });
+        node.counts().primary
+    };
+    let mut traced = vec![turn(&mut node)];
+    for event in events {
+        event(&mut node);
+        traced.push(turn(&mut node));
+    }
+    let asked = |peer| link.0.iter().filter(|sent| **sent == (peer, Message::Clip { first: 0, count: 1 })).count();
+    assert_eq!([asked(HOST), asked(1)], [usize::from(subhosts == 0), usize::from(subhosts == 1)]);
+    traced
+}
+
+/// A bundle is begun when its cliplist has come (the 1995 report, chapter 4), or when there is nobody who would send it.
+#[test]
+fn a_bundle_waits_for_its_cliplist() {
+    let from = |peer| {
+        move |node: &mut Node<'_, '_, All<'_>>| {
+            node.handle(peer, &View { message: Message::Cliplist { first: 0, pages: 1 }, body: &[0; 4] });
+        }
+    };
+    assert_eq!(traced(2, &[]), [64], "who clips for itself");
+    assert_eq!(traced(0, &[&from(1), &from(HOST)]), [0, 0, 64]);
+    assert_eq!(traced(1, &[&from(HOST), &from(1)]), [0, 0, 64]);
+    assert_eq!(traced(1, &[&|node| node.lost(1)]), [0, 64]);
 }

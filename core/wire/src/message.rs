@@ -197,7 +197,24 @@ pub enum Message {
         /// How many, 1 or more.
         count: u32,
     },
+    /// Node to its subhost, or to the host: which pages does this bundle meet?
+    Clip {
+        /// First tile.
+        first: u32,
+        /// How many, 1 to 4.
+        count: u8,
+    },
+    /// The answer to [`Message::Clip`]: the body is the pages' numbers, the nearest first, each 4 bytes.
+    Cliplist {
+        /// First tile.
+        first: u32,
+        /// How many pages, [`CLIPLIST_MAX`] at most.
+        pages: u8,
+    },
 }
+
+/// Pages of a cliplist at most.
+pub const CLIPLIST_MAX: usize = 8;
 
 /// Bytes of the longest head.
 pub const HEAD_BYTES_MAX: usize = 128;
@@ -245,6 +262,7 @@ impl Message {
             }
             Self::Partials { count } => *count as usize * size_of::<Partial>(),
             Self::Part { bytes, .. } => *bytes as usize,
+            Self::Cliplist { pages, .. } => *pages as usize * 4,
             _ => 0,
         }
     }
@@ -271,6 +289,9 @@ pub fn decode(bytes: &[u8]) -> Result<View<'_>, WireError> {
     if let Message::Contributions { width, height, .. } = message
         && (u32::from(width) > TILE || u32::from(height) > TILE)
     {
+        return Err(WireError::Head);
+    }
+    if matches!(message, Message::Cliplist { pages, .. } if usize::from(pages) > CLIPLIST_MAX) {
         return Err(WireError::Head);
     }
     if message.body_bytes() > BODY_BYTES_MAX {
@@ -349,6 +370,9 @@ mod tests {
         check(Message::Idle { given: true });
         check(Message::Back { with: u16::MAX, first: u32::MAX, count: u32::MAX });
         check(Message::Kept { first: u32::MAX, count: u32::MAX });
+        check(Message::Clip { first: u32::MAX, count: 4 });
+        check(Message::Cliplist { first: u32::MAX, pages: 8 });
+        check(Message::Cliplist { first: 0, pages: 0 });
         check(Message::Fetch { page: u32::MAX });
         check(Message::Part { page: u32::MAX, offset: u32::MAX, bytes: 4096 });
         check(Message::Rays { rays: 186, shadows: 0, load: 0 });
@@ -376,10 +400,12 @@ mod tests {
         check(Message::Tiles { first: 1172, count: 300, epoch: 0 }, &[2, 0x94, 9, 0xac, 2, 0]);
         check(Message::Rays { rays: 100, shadows: 3, load: 300 }, &[9, 100, 3, 0xac, 2]);
         check(Message::Took { taken: true, load: 0 }, &[10, 1, 0]);
-        check(Message::Kept { first: 1172, count: 300 }, &[16, 0x94, 9, 0xac, 2]);
+        check(Message::Kept { first: 1172, count: 300 }, &[17, 0x94, 9, 0xac, 2]);
         check(Message::Partials { count: 409 }, &[11, 0x99, 3]);
         check(Message::Fetch { page: 1172 }, &[12, 0x94, 9]);
         check(Message::Part { page: 1172, offset: 4096, bytes: 4096 }, &[13, 0x94, 9, 0x80, 0x20, 0x80, 0x20]);
+        check(Message::Clip { first: 1172, count: 4 }, &[18, 0x94, 9, 4]);
+        check(Message::Cliplist { first: 1172, pages: 3 }, &[19, 0x94, 9, 3]);
         let body = |message: Message| message.body_bytes();
         assert_eq!(body(Message::Rays { rays: 100, shadows: 3, load: 300 }), 8992);
         assert_eq!(body(Message::Partials { count: 409 }), 16_360);
@@ -416,6 +442,9 @@ mod tests {
         check(tile(8, 8), true);
         check(tile(9, 8), false);
         check(tile(255, 255), false);
+        check(Message::Cliplist { first: 0, pages: 8 }, true);
+        check(Message::Cliplist { first: 0, pages: 9 }, false);
+        check(Message::Cliplist { first: 0, pages: 255 }, false);
     }
 
     /// Messages with bodies, of which bits are changed, or the end is cut off or drawn out.
@@ -429,12 +458,13 @@ mod tests {
         let (mut taken, mut refused) = (0, 0);
         for _ in 0..40_000 {
             let small = next(4) as u16;
-            let message = match next(6) {
+            let message = match next(7) {
                 0 => Message::Rays { rays: small, shadows: next(4) as u16, load: next(65_536) as u16 },
                 1 => Message::Partials { count: small },
                 2 => Message::Part { page: next(1 << 32) as u32, offset: next(70_000) as u32, bytes: 100 * small },
                 3 => Message::Took { taken: small > 1, load: small },
                 4 => Message::Fetch { page: next(1 << 32) as u32 },
+                5 => Message::Cliplist { first: next(1 << 32) as u32, pages: small as u8 },
                 _ => {
                     Message::Contributions { tile: 1, epoch: 0, width: small as u8, height: 8, rays: 9, entry: 1 << 60 }
                 }
@@ -468,7 +498,7 @@ mod tests {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 *b = (state >> 56) as u8;
             }
-            bytes[0] %= 17;
+            bytes[0] %= 21;
             taken += u32::from(decode(&bytes[..(round % 49) as usize]).is_ok());
         }
         assert!(taken > 100, "some noise is a message: {taken}");

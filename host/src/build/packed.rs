@@ -159,6 +159,16 @@ impl Packed {
         self.index.primitives[page as usize]
     }
 
+    /// Primitives in the pages of each of so many nodes, by the pages' `owners`: node 1's first.
+    #[must_use]
+    pub fn objects_of(&self, owners: &[u16], nodes: u16) -> Vec<u64> {
+        let mut objects = vec![0; usize::from(nodes)];
+        for (&owner, &primitives) in owners.iter().zip(&self.index.primitives) {
+            objects[usize::from(owner) - 1] += u64::from(primitives);
+        }
+        objects
+    }
+
     /// What [`crate::partition::owners`] needs to know: pages of whole lines, as they lie in memory.
     #[must_use]
     pub fn placed_pages(&self) -> Vec<PlacedPage> {

@@ -3,6 +3,7 @@
 //! Pure functions: nothing here holds pages, opens files, or knows what a node is doing. Lengths are in the scene's
 //! internal unit, memory in bytes.
 
+mod barred;
 mod budget;
 mod light_cache;
 mod owners;
@@ -10,6 +11,7 @@ mod pilot;
 mod placement;
 mod voxels;
 
+pub use barred::{NoCandidate, barred};
 pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
 pub use light_cache::{LightCaches, light_caches};
 pub use owners::{Misfit, PlacedPage, owners};

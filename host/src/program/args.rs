@@ -2,13 +2,14 @@
 
 use crate::build::{Rule, Settings};
 use crate::partition::Voxels;
+use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
 use hybray_scene::PAGE_BYTES_MAX;
-use hybray_scheduler::Settings as NodeSettings;
-use hybray_scheduler::policy::Policy;
+use hybray_scheduler::policy::{Criterion, Policy, Tiles};
+use hybray_scheduler::{Options, Settings as NodeSettings};
 use hybray_simulated::{MACHINES, Machine, NODES_MAX};
 use hybray_wire::{BODY_BYTES_MAX, RayRecord};
 use std::path::PathBuf;
@@ -101,12 +102,28 @@ pub(super) struct WorkArgs {
     #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u16).range(1..=GRANULARITY_MAX), help_heading = BUDGET)]
     pub granularity: Option<u16>,
     /// A node begins no new tile while so many rays wait in it (table 6.1: pixels in the system). Default: 4096, or half
-    /// of what the node has room for
+    /// of what the node has room for. With --tiles pixel-count also the pixels of a node that the host keeps in the system
     #[arg(long, value_name = "RAYS", value_parser = clap::value_parser!(u32).range(1..), help_heading = BUDGET)]
     pub in_system: Option<u32>,
     /// Side in pixels of a pyramid of primary rays: 8 or 16 (table 6.1). Default: 16
     #[arg(long, value_name = "PIXELS", value_parser = PossibleValuesParser::new(["8", "16"]).map(|side| if side == "8" { 8u8 } else { 16 }), help_heading = BUDGET)]
     pub pyramid: Option<u8>,
+    /// When nodes are given tiles (the report's chapter 3). Default: dynamic
+    #[arg(long, value_enum, help_heading = BUDGET)]
+    pub tiles: Option<When>,
+    /// Which nodes are given tiles (table 6.2): `all`, `all-but-host` (all but node 1, where the host is), `location` (those
+    /// whose voxel lies at the boundary of the grid), or `objects:N` (those with N objects at most). Default: all; one node
+    /// alone is always given them
+    #[arg(long, value_name = "WHO", value_parser = criterion, help_heading = BUDGET)]
+    pub demand_driven: Option<Criterion>,
+    /// Nodes that clip pyramids, each for itself and the same number of others (chapter 4, table 6.3): 0 has the host do it
+    /// for all. Default: every node for itself
+    #[arg(long, value_name = "N", help_heading = BUDGET)]
+    pub subhosts: Option<u16>,
+    /// Whether nodes that have nothing to do at the end of the picture are given some of the others' rays and
+    /// tiles; never with --tiles static. Default: on
+    #[arg(long, value_enum, help_heading = BUDGET)]
+    pub take_over: Option<Switch>,
 }
 
 /// What of a node's memory is for shadow rays.
@@ -125,9 +142,69 @@ impl WorkArgs {
             granularity: self.granularity.unwrap_or(settings.granularity),
             in_system: self.in_system.unwrap_or(settings.in_system),
             bundle_tiles: self.pyramid.map_or(settings.bundle_tiles, |side| if side == 8 { 1 } else { 4 }),
+            subhosts: self.subhosts.or(settings.subhosts),
             ..settings
         }
     }
+
+    /// How tiles are given out to nodes with these settings, in pieces of `tile` pixels a side.
+    pub fn options(&self, spread: Option<f32>, tile: Option<u32>, settings: &NodeSettings) -> Options {
+        let tiles = match self.tiles.unwrap_or(When::Dynamic) {
+            When::Dynamic => Tiles::Dynamic,
+            When::PixelCount => Tiles::PixelCount { pixels: settings.in_system },
+            When::Static => Tiles::Static,
+        };
+        let take_over = !matches!(self.take_over, Some(Switch::Off));
+        Options { spread, atomic: tile.map(|side| (side / 8) * (side / 8)), tiles, take_over }
+    }
+
+    /// Refuses what cannot be, with so many nodes.
+    pub fn check(&self, dispatcher: Where, memory: Option<u64>, nodes: u16) -> Result<()> {
+        if let Some(subhosts) = self.subhosts.filter(|&subhosts| subhosts > nodes) {
+            let s = if nodes == 1 { "" } else { "s" };
+            bail!("there cannot be {subhosts} subhosts among {nodes} node{s}: give --subhosts {nodes}, or fewer");
+        }
+        if let (Some(When::PixelCount), Where::Node) = (self.tiles, dispatcher) {
+            bail!(
+                "the host counts the pixels for --tiles pixel-count, so it must give out tiles: give --dispatcher host"
+            );
+        }
+        if self.demand_driven.is_some() && memory.is_none() {
+            bail!(
+                "--demand-driven is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB"
+            );
+        }
+        Ok(())
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum When {
+    /// When they say that they are done
+    Dynamic,
+    /// When fewer of their pixels have not come back than --in-system says: the host counts
+    PixelCount,
+    /// Before the start
+    Static,
+}
+
+impl When {
+    /// What users call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dynamic => "dynamic",
+            Self::PixelCount => "pixel-count",
+            Self::Static => "static",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Switch {
+    /// Yes
+    On,
+    /// No
+    Off,
 }
 
 /// Rays that a message has room for.
@@ -443,6 +520,16 @@ fn scheduler() -> impl TypedValueParser<Value = Policy> {
         let named = Policy::ALL.into_iter().find(|&(known, _)| known == name);
         named.map_or_else(Policy::default, |(_, policy)| policy)
     })
+}
+
+fn criterion(text: &str) -> Result<Criterion, String> {
+    match text.split_once(':') {
+        None if text == "all" => Ok(Criterion::All),
+        None if text == "all-but-host" => Ok(Criterion::AllButHost),
+        None if text == "location" => Ok(Criterion::Location),
+        Some(("objects", most)) if most.parse::<u64>().is_ok() => Ok(Criterion::Objects(most.parse().unwrap_or(0))),
+        _ => Err("give all, all-but-host, location, or a number of objects, such as objects:500".to_owned()),
+    }
 }
 
 /// Bytes, with a unit: 32MiB, 512KiB, 1GiB, or a plain number.

@@ -1,10 +1,10 @@
 //! Nodes with a budget, for every command that has them: what fits, and what people are told if it does not.
 
 use super::args::TreeArgs;
-use crate::partition::{Fit, NoFit, Pilot, Wanted, page_bytes_for};
+use crate::partition::{Fit, NoFit, Pilot, Voxels, Wanted, barred, page_bytes_for};
 use crate::prepare::Prepared;
 use anyhow::{Result, bail};
-use hybray_scheduler::policy::Policy;
+use hybray_scheduler::policy::{Criterion, Policy};
 use hybray_scheduler::{PlanError, Sizes};
 use hybray_tracer::Scene;
 
@@ -77,6 +77,20 @@ impl Farm<'_> {
                 self.remedies(&wanted)
             ),
         }
+    }
+
+    /// Which nodes are given no tiles: entry 0 is the host's.
+    ///
+    /// # Errors
+    /// If that would be all.
+    pub fn barred(&self, criterion: Option<Criterion>, prepared: &Prepared, fit: &Fit) -> Result<Vec<bool>> {
+        let objects = prepared.packed.objects_of(&fit.owners, self.nodes);
+        Ok(barred(criterion.unwrap_or_default(), self.voxels(), &objects)?)
+    }
+
+    /// How the scene is cut, as far as that is known.
+    pub fn voxels(&self) -> Voxels {
+        self.tree.voxels.filter(|_| !self.packed).unwrap_or_default()
     }
 
     /// What is enough for this scene.

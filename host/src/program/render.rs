@@ -1,6 +1,6 @@
 //! `hybray render`.
 
-use super::args::{RenderArgs, Where};
+use super::args::{RenderArgs, When, Where};
 use super::budget::{Farm as BudgetFarm, size};
 use super::keep::{Keeper, State};
 use super::report::{
@@ -19,7 +19,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use hybray_native::{DispatcherAt, Farm, NODES_MAX, Traced, Worked, trace, trace_within};
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{NodeReport, Options, Outcome, Settings as NodeSettings, Sizes};
+use hybray_scheduler::{NodeReport, Outcome, Settings as NodeSettings, Sizes};
 use hybray_shading::Camera;
 use hybray_wire::Frame;
 use std::io::ErrorKind;
@@ -31,7 +31,9 @@ use std::time::{Duration, Instant};
 pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let start = Instant::now();
     let interrupted = interrupts()?;
-    check_budget(args)?;
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
+    let nodes = args.nodes.unwrap_or(cores);
+    check_budget(args, nodes)?;
     // What could go wrong at the end is tried at the beginning.
     let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene));
     let output = Output::create(&path, Format::of(&path, args.bits == "16")?)?;
@@ -50,8 +52,6 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
         show.line(&format!("{}: {primitives} primitives", args.scene.scene));
     };
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
-    let nodes = args.nodes.unwrap_or(cores);
     let page_bytes = args.memory.map_or(PAGE_BYTES_MAX as u32, |memory| page_bytes_for(memory, nodes));
     let packed = is_packed(&args.scene.scene);
     let (mut prepared, import_time) = if packed {
@@ -83,6 +83,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let frame = prepared.frame(&camera, &wanted);
     check_camera(&frame)?;
     let exposure = prepared.exposure(&wanted);
+    let policy = args.scheduler.unwrap_or_default();
+    let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
     let farm = Farm {
         nodes,
         kernels: args.kernels.kernels(),
@@ -90,14 +92,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
             Where::Host => DispatcherAt::Host,
             Where::Node => DispatcherAt::Node,
         },
-        options: Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) },
+        options: args.work.options(args.spread, args.tile, &settings),
     };
 
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
-    let policy = args.scheduler.unwrap_or_default();
-    let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
-    let mut fit = None;
+    let (mut fit, mut barred) = (None, Vec::new());
     if let Some(memory) = args.memory {
         let light_cache = args.light.light_cache;
         let pilot = Pilot::of_policy(policy, &scene, &frame).filter(|_| nodes > 1);
@@ -114,6 +114,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
             packed,
         };
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
+        barred = farm.barred(args.work.demand_driven, &prepared, fit)?;
         show.line(&budget_line(fit, nodes, memory, policy));
     }
     let subject = || prepared.subject(&pages, &frame);
@@ -138,6 +139,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
                 copies: &fit.copies,
                 parts: &fit.parts,
                 settings,
+                barred: &barred,
             };
             trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?
         }
@@ -160,6 +162,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
             granularity: settings.granularity,
             in_system: settings.in_system,
             pyramid: if settings.bundle_tiles == 1 { 8 } else { 16 },
+            tiles: args.work.tiles.unwrap_or(When::Dynamic).name(),
+            nodes_with_tiles: usize::from(nodes) - barred.iter().filter(|&&barred| barred).count(),
+            subhosts: settings.subhosts.unwrap_or(nodes),
+            take_over: farm.options.take_over,
             page_bytes_max: Sizes::of(&scene).page_bytes_max,
             voxels: prepared.packed.voxels(),
             plan: PlanReport::of(fit, scene.shading.lights.len()),
@@ -248,7 +254,7 @@ fn remove(film: &Path) -> Result<()> {
 }
 
 /// What is about nodes with a budget wants one.
-fn check_budget(args: &RenderArgs) -> Result<()> {
+fn check_budget(args: &RenderArgs, nodes: u16) -> Result<()> {
     let work = &args.work;
     let given = [
         ("--scheduler", args.scheduler.is_some()),
@@ -256,11 +262,15 @@ fn check_budget(args: &RenderArgs) -> Result<()> {
         ("--in-system", work.in_system.is_some()),
         ("--pyramid", work.pyramid.is_some()),
         ("--light-cache", args.light.light_cache.is_some()),
+        ("--tiles", work.tiles.is_some()),
+        ("--demand-driven", work.demand_driven.is_some()),
+        ("--subhosts", work.subhosts.is_some()),
+        ("--take-over", work.take_over.is_some()),
     ];
     if let Some((name, _)) = given.iter().find(|(_, given)| *given && args.memory.is_none()) {
         bail!("{name} is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB");
     }
-    Ok(())
+    work.check(args.dispatcher, args.memory, nodes)
 }
 
 fn budget_line(fit: &Fit, nodes: u16, memory: u64, policy: Policy) -> String {

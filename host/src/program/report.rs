@@ -106,6 +106,10 @@ pub(super) struct Budget {
     pub in_system: u32,
     /// Side in pixels.
     pub pyramid: u8,
+    pub tiles: &'static str,
+    pub nodes_with_tiles: usize,
+    pub subhosts: u16,
+    pub take_over: bool,
     /// Of the largest page.
     pub page_bytes_max: usize,
     pub voxels: u32,

@@ -8,14 +8,14 @@ use super::show::Show;
 use super::{End, camera, prepare};
 use crate::model::Settings;
 use crate::pack::is_packed;
-use crate::partition::page_bytes_for;
+use crate::partition::{Voxels, page_bytes_for};
 use crate::simulate::record::{Report, Run};
 use crate::simulate::runs::{Experiment, name_of};
 use crate::simulate::{csv, html};
 use anyhow::{Result, bail};
 use hybray_link::HOST;
 use hybray_scene::PAGE_BYTES_MAX;
-use hybray_scheduler::{Options, Sizes};
+use hybray_scheduler::Sizes;
 use hybray_simulated::NODES_MAX;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,6 +23,9 @@ use std::sync::atomic::Ordering;
 
 pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let interrupted = interrupts()?;
+    // One node alone clips for nobody.
+    let fewest = args.nodes.iter().filter(|&&nodes| nodes > 1).min().unwrap_or(&1);
+    args.work.check(args.dispatcher, args.memory, *fewest)?;
     // What could go wrong at the end is tried at the beginning.
     let outputs = [&args.json, &args.csv, &args.html];
     let to_standard_output = |path: &&Option<PathBuf>| path.as_deref() == Some(Path::new("-"));
@@ -48,6 +51,8 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let pages_bytes = Sizes::of(&scene).pages_bytes;
     let page_memory = args.page_memory.map(|page_memory| page_memory.bytes(pages_bytes));
     // One node alone has the whole scene.
+    let criterion = args.work.demand_driven;
+    let mut voxels = Voxels::One;
     let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
     for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
         let packed = is_packed(&args.scene.scene);
@@ -64,8 +69,9 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
             packed,
         };
         if nodes > 1 {
-            farm.fit(&prepared, &scene)?;
+            farm.barred(criterion, &prepared, &farm.fit(&prepared, &scene)?)?;
         }
+        voxels = farm.voxels();
     }
 
     let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
@@ -73,13 +79,14 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
         Where::Host => HOST,
         Where::Node => 1,
     };
-    experiment.options = Options { spread: args.spread, atomic: args.tile.map(|side| (side / 8) * (side / 8)) };
+    (experiment.criterion, experiment.voxels) = (criterion.unwrap_or_default(), voxels);
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
     (experiment.memory, experiment.page_memory) = (args.memory, page_memory);
     experiment.light_cache = args.light.light_cache;
     for (policy, nodes) in farms {
         experiment.settings = args.work.settings(args.machine.settings(policy));
+        experiment.options = args.work.options(args.spread, args.tile, &experiment.settings);
         let s = if nodes == 1 { "" } else { "s" };
         show.line(&format!("{}, {} with {nodes} node{s}", args.machine.name, name_of(policy)));
         show.begin(0, 0);

@@ -4,10 +4,10 @@
 //! made once for all the others.
 
 use super::record::{NodeRun, QueueRun, Rays, Run};
-use crate::partition::{Fit, NoFit, Pilot, Wanted};
+use crate::partition::{Fit, NoCandidate, NoFit, Pilot, Voxels, Wanted, barred};
 use crate::prepare::Prepared;
 use hybray_link::{HOST, Peer};
-use hybray_scheduler::policy::Policy;
+use hybray_scheduler::policy::{Criterion, Policy};
 use hybray_scheduler::{Options, Outcome, Progress, Settings, Sizes};
 use hybray_simulated::{Budget, Farm, Machine, SimulateError, Simulated, simulate};
 use hybray_tracer::Scene;
@@ -38,6 +38,10 @@ pub struct Experiment<'a> {
     pub light_cache: Option<u64>,
     /// What rays of the picture found that were ahead of it, when that was asked for.
     pilot: OnceCell<Option<Pilot>>,
+    /// Which nodes are given tiles, where they have memory; one alone always is.
+    pub criterion: Criterion,
+    /// How the scene was cut: some criterion needs to know.
+    pub voxels: Voxels,
     /// The run of one node, when it has been made.
     alone: Option<Simulated>,
     pages: Vec<&'a [u8]>,
@@ -71,13 +75,18 @@ impl<'a> Experiment<'a> {
             page_memory: None,
             light_cache: None,
             pilot: OnceCell::new(),
+            criterion: Criterion::All,
+            voxels: Voxels::One,
             alone: None,
             pages: prepared.packed.page_slices(),
         }
     }
 
     /// Who owns which page, and what every node is made of, if nodes have a budget.
-    fn fit(&self, nodes: Peer) -> Result<Option<Fit>, NoFit> {
+    ///
+    /// # Errors
+    /// If it does not fit.
+    pub fn fit(&self, nodes: Peer) -> Result<Option<Fit>, NoFit> {
         // The one-node run has unlimited memory (DESIGN section 12).
         let Some(memory) = self.memory.filter(|_| nodes > 1) else { return Ok(None) };
         let (sizes, page_memory, policy) = (Sizes::of(self.scene), self.page_memory, self.settings.policy);
@@ -88,6 +97,14 @@ impl<'a> Experiment<'a> {
         let pilot = if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None };
         let (pages, voxels) = (packed.placed_pages(), packed.voxels());
         wanted.fit_picture(&pages, voxels, self.scene, self.light_cache, pilot).map(Some)
+    }
+
+    /// Which of so many nodes are given no tiles: entry 0 is the host's.
+    ///
+    /// # Errors
+    /// If that would be all.
+    pub fn barred(&self, owners: &[u16], nodes: Peer) -> Result<Vec<bool>, NoCandidate> {
+        barred(self.criterion, self.voxels, &self.prepared.packed.objects_of(owners, nodes))
     }
 
     /// Draws it on so many nodes. `watch` is called often; the picture ends as it is when it returns false.
@@ -105,12 +122,14 @@ impl<'a> Experiment<'a> {
         watch: &mut dyn FnMut(Progress) -> bool,
     ) -> Result<Simulated, RunError> {
         let Self { machine, dispatcher, options, settings, page_memory, .. } = *self;
+        let barred = fit.map(|fit| self.barred(&fit.owners, nodes)).transpose()?.unwrap_or_default();
         let budget = self.memory.zip(fit).map(|(memory, fit)| Budget {
             memory,
             page_memory,
             owners: &fit.owners,
             copies: &fit.copies,
             parts: &fit.parts,
+            barred: &barred,
         });
         let farm = Farm { machine, nodes, dispatcher, options, settings, budget };
         Ok(simulate(self.scene, self.prepared.hash, &self.pages, self.frame, &farm, watch)?)
@@ -221,6 +240,9 @@ pub enum RunError {
     /// The pages do not fit.
     #[error(transparent)]
     NoFit(#[from] NoFit),
+    /// No node would be given tiles.
+    #[error(transparent)]
+    NoCandidate(#[from] NoCandidate),
     /// The machines say so, and that is a bug.
     #[error("the picture on {nodes} nodes is not finished but {outcome:?}: please report this, with the scene")]
     Unfinished {

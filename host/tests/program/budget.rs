@@ -101,6 +101,12 @@ fn how_nodes_work_changes_no_picture_either() {
         "--nodes 4 --memory 128KiB --in-system 1",
         "--nodes 4 --memory 128KiB --pyramid 8 --scheduler demand-driven",
         "--nodes 4 --memory 256KiB --page-bytes 65536 --voxels 2x2x1",
+        "--nodes 4 --memory 128KiB --tiles static --take-over off",
+        "--nodes 4 --memory 128KiB --subhosts 0",
+        "--nodes 4 --memory 128KiB --subhosts 1 --pyramid 8",
+        "--nodes 5 --memory 128KiB --subhosts 5",
+        "--nodes 4 --memory 128KiB --tiles pixel-count --in-system 64 --demand-driven all-but-host",
+        "--nodes 6 --memory 256KiB --voxels 3x2x1 --demand-driven location --scheduler hybrid-1995",
         "--nodes 8 --memory 1000GiB --kernels portable",
         "--nodes 4 --memory 256KiB --light-cache 24KiB --page-bytes 4096",
         "--nodes 4 --memory 256KiB --light-cache 0 --scheduler hybrid-1995 --page-bytes 4096",
@@ -111,6 +117,36 @@ fn how_nodes_work_changes_no_picture_either() {
     let r = json(&folder, &format!("{usual} --nodes 4 --memory 128KiB --granularity 7 --in-system 9 --pyramid 8"));
     let said = ["granularity", "in_system", "pyramid"].map(|name| whole(&r, &format!("/budget/{name}")));
     assert_eq!(said, [7, 9, 8]);
+    assert_eq!((&r["budget"]["tiles"], &r["budget"]["take_over"]), (&"dynamic".into(), &true.into()));
+}
+
+/// Who may be given tiles is, and nobody else; an error says who could be.
+#[test]
+fn tiles_go_to_those_that_a_criterion_admits() {
+    let folder = Folder::new();
+    let usual = "render spd:balls-noground:3 --size 64x64 --spp 1 -q -o a.png --nodes 9 --voxels 3x3x1 --memory 256KiB \
+                 --scheduler hybrid-1995";
+    let with_tiles = |more: &str| {
+        let r = json(&folder, &format!("{usual} {more}"));
+        let nodes = r["nodes"].as_array().unwrap();
+        let numbers: Vec<u64> = nodes.iter().filter(|n| whole(n, "/runs") > 0).map(|n| whole(n, "/node")).collect();
+        assert!(numbers.len() as u64 <= whole(&r, "/budget/nodes_with_tiles"), "{more}");
+        (numbers, whole(&r, "/budget/nodes_with_tiles"), nodes.iter().map(|n| whole(n, "/runs")).max())
+    };
+    // Static: each has a part of the picture, in one run.
+    assert_eq!(with_tiles("--tiles static --take-over off"), ((1..=9).collect(), 9, Some(1)));
+    assert_eq!(
+        with_tiles("--tiles static --take-over off --demand-driven all-but-host"),
+        ((2..=9).collect(), 8, Some(1))
+    );
+    let (location, admitted, _) = with_tiles("--tiles static --take-over off --demand-driven location");
+    assert_eq!((location.len(), admitted), (8, 8));
+    let said = talk(&folder.run(&format!("{usual} --demand-driven objects:1")));
+    let (_, advice) = said.split_once("give ").unwrap_or_else(|| panic!("{said}"));
+    let least = advice.split_once(',').unwrap().0;
+    assert_eq!(with_tiles(&format!("--tiles static {least}")).1, 1);
+    let said = talk(&folder.run(&usual.replace("3x3x1", "4x4x1").replace("-q", "-q --demand-driven location")));
+    assert!(said.contains("--voxels 3x3x1"), "{said}");
 }
 
 /// What an error says would do, does; both ways out of it.
@@ -168,6 +204,10 @@ fn settings_of_budgets_want_one() {
         ("--in-system", "9"),
         ("--pyramid", "8"),
         ("--light-cache", "0"),
+        ("--tiles", "static"),
+        ("--demand-driven", "all"),
+        ("--subhosts", "0"),
+        ("--take-over", "off"),
     ] {
         let output = folder.run(&format!("render spd:balls:1 -o a.png {option} {value}"));
         let said = talk(&output);
@@ -181,6 +221,11 @@ fn settings_of_budgets_want_one() {
         ("--in-system", "0", "--in-system"),
         ("--pyramid", "12", "8, 16"),
         ("--light-cache", "12parsecs", "`parsecs` is no unit of memory"),
+        ("--tiles", "sometimes", "dynamic, pixel-count, static"),
+        ("--demand-driven", "some", "objects:500"),
+        ("--demand-driven", "objects:-1", "objects:500"),
+        ("--subhosts", "-1", "--subhosts"),
+        ("--take-over", "maybe", "on, off"),
         ("--memory", "0", "such as 32MiB"),
         ("--memory", "99999999999GiB", "such as 32MiB"),
         ("--memory", "12parsecs", "`parsecs` is no unit of memory"),

@@ -45,7 +45,19 @@ fn how_nodes_work_changes_the_run_and_not_the_film() {
     let usual =
         "spd:balls:3 --machine gigabit --nodes 4 --memory 128KiB --size 160x160 --spp 1 --scheduler data-parallel";
     let first = &runs(&folder, usual)[0];
-    for more in ["--granularity 2", "--in-system 20", "--pyramid 8", "--voxels 2x2x1", "--page-bytes 8192"] {
+    for more in [
+        "--granularity 2",
+        "--in-system 20",
+        "--pyramid 8",
+        "--voxels 2x2x1",
+        "--page-bytes 8192",
+        "--tiles static",
+        "--tiles pixel-count",
+        "--demand-driven all-but-host",
+        "--take-over off",
+        "--subhosts 0",
+        "--subhosts 2",
+    ] {
         let run = &runs(&folder, &format!("{usual} {more}"))[0];
         assert_eq!(run["film"], first["film"], "{more}");
         assert_ne!(run["events"], first["events"], "{more} changed nothing");
@@ -124,6 +136,16 @@ fn mistakes() {
     for wrong in ["2/3", "1/0", "1/", "half"] {
         check(&format!("{two} --memory 1MiB --page-memory {wrong}"), 2, &[wrong, "512KiB", "1/16"]);
     }
+    let farm = "spd:balls:1 --machine threads --nodes 4 -q";
+    check(&format!("{farm} --subhosts 5"), 1, &["5 subhosts", "4 nodes", "--subhosts 4"]);
+    check(&format!("{farm} --tiles pixel-count --dispatcher node"), 1, &["pixel-count", "--dispatcher host"]);
+    check(&format!("{farm} --demand-driven location"), 1, &["--demand-driven", "--memory 32MiB"]);
+    check(&format!("{farm} --memory 1MiB --demand-driven location"), 1, &["--voxels 2x2x1"]);
+    check(
+        &format!("{farm} --memory 1MiB --voxels 2x2x1 --demand-driven objects:0"),
+        1,
+        &["more than 0 objects", "--demand-driven objects:"],
+    );
     check("spd:balls:1 --machine threads --nodes 2 --json - --csv -", 1, &["only one", "standard output"]);
     check("nosuch.nff --machine threads --nodes 2", 1, &["nosuch.nff", "no such file"]);
     assert!(folder.names().is_empty());

@@ -10,8 +10,9 @@ use hybray_runner::{run_master, run_node};
 use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
-    All, Asked, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome,
-    PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, can_draw, light_cache_bytes,
+    All, Asked, Clipper, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options,
+    Outcome, PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, Unclipped, can_draw,
+    light_cache_bytes,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -38,7 +39,7 @@ pub struct Farm {
     pub kernels: Kernels,
     /// Where tiles are given out.
     pub dispatcher: DispatcherAt,
-    /// T, and the least run.
+    /// T, the least run, and when nodes are given tiles: pixels can be counted at the host only.
     pub options: Options,
 }
 
@@ -57,6 +58,8 @@ pub struct Budget<'a> {
     pub parts: &'a [u32],
     /// How nodes work.
     pub settings: Settings,
+    /// Nodes that are given no tiles: entry 0 is the host's. None if it is empty.
+    pub barred: &'a [bool],
 }
 
 /// Nodes of one process at most: links between all pairs are counted one by one.
@@ -91,7 +94,7 @@ pub struct Traced {
 pub fn trace(scene: &Scene<'_>, scene_hash: u64, frame: &Frame, farm: &Farm, watch: &mut dyn Watch) -> Option<Traced> {
     let limits = Limits::all_at_hand();
     let bytes = NodeMemory::sum(&limits).total_bytes();
-    run(frame, scene_hash, farm, None, watch, &|peer, link, dispatcher, clock| {
+    run(frame, scene_hash, farm, None, None, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
         let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
@@ -126,7 +129,9 @@ pub fn trace_within(
     let light_bytes = light_cache_bytes(scene.resident.directory.entries, budget.copies);
     let plan = plan.with_light_cache(light_bytes, budget.memory)?;
     let bytes = plan.sum().total_bytes();
-    Ok(run(frame, scene_hash, farm, Some(budget), watch, &|peer, link, dispatcher, clock| {
+    // Where there are no subhosts the host clips.
+    let clips = (budget.settings.subhosts == Some(0)).then_some(&scene);
+    Ok(run(frame, scene_hash, farm, Some(budget), clips, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let (memory, mut cache, scene) =
             plan.carve(&mut Arena::new(&mut memory), &scene).expect("the sum of its terms");
@@ -171,6 +176,18 @@ fn dispatcher_at(farm: &Farm) -> Peer {
     }
 }
 
+/// Where nodes must ask for pages, each does best to draw on the same ones for long.
+fn dispatcher<'m>(
+    states: &'m mut [NodeState],
+    kept: &'m mut [u64],
+    farm: &Farm,
+    budget: Option<&Budget<'m>>,
+) -> Dispatcher<'m> {
+    let dispatcher = Dispatcher::new(states, farm.options).keeping(kept);
+    let Some(budget) = budget else { return dispatcher };
+    dispatcher.biased(!budget.pages.is_empty()).with_parts(budget.parts).barring(budget.barred)
+}
+
 type Clock = dyn Fn() -> u64 + Sync;
 /// Makes and turns a node, on a thread of its own.
 type Turn<'a> = dyn Fn(Peer, &mut MemoryLink, Option<Dispatcher<'_>>, &Clock) -> Worked + Sync + 'a;
@@ -196,21 +213,21 @@ pub struct Worked {
     pub high_water: HighWater,
 }
 
-/// Runs the machines; the host gives out pages of the `budget` whose owners are lost. `node` makes and turns each node, on a thread of its own.
+/// Runs the machines; the host gives out pages whose owners are lost, and clips the scene of `clips`. `node` makes and turns each node, on a thread of its
+/// own.
 fn run(
     frame: &Frame,
     scene_hash: u64,
     farm: &Farm,
     budget: Option<&Budget<'_>>,
+    clips: Option<&Scene<'_>>,
     watch: &mut dyn Watch,
     node: &Turn<'_>,
 ) -> Option<Traced> {
     let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame))?;
     let nodes = farm.nodes.clamp(1, NODES_MAX);
     let peers = usize::from(nodes) + 1;
-    let (pages, parts) = budget.map_or((&[][..], &[][..]), |budget| (budget.pages, budget.parts));
-    // Where nodes must ask for pages, each does best to draw on the same ones for long.
-    let biased = !pages.is_empty();
+    let pages = budget.map_or(&[][..], |budget| budget.pages);
     // A bit for each tile, where tiles are given out.
     let kept_words = map.len().div_ceil(64) as usize;
     let dispatcher_at = dispatcher_at(farm);
@@ -233,23 +250,19 @@ fn run(
                 let here = peer == dispatcher_at;
                 let mut states = vec![NodeState::default(); if here { peers } else { 0 }];
                 let mut kept = vec![0; if here { kept_words } else { 0 }];
-                let dispatcher = here.then(|| {
-                    Dispatcher::new(&mut states, farm.options)
-                        .on(peer)
-                        .biased(biased)
-                        .with_parts(parts)
-                        .keeping(&mut kept)
-                });
+                let dispatcher = here.then(|| dispatcher(&mut states, &mut kept, farm, budget).on(peer));
                 let did = node(peer, &mut link, dispatcher, clock);
                 worked.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[usize::from(peer) - 1] = did;
             });
         }
         let (mut states, mut kept) = (vec![NodeState::default(); peers], vec![0; kept_words]);
-        let dispatcher = (dispatcher_at == HOST)
-            .then(|| Dispatcher::new(&mut states, farm.options).biased(biased).with_parts(parts).keeping(&mut kept));
+        let dispatcher = (dispatcher_at == HOST).then(|| dispatcher(&mut states, &mut kept, farm, budget));
         let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
         let server = PageServer::new(&mut asked, &mut turns);
-        let outcome = run_master(&mut master, dispatcher, server, pages, &mut host_link, &mut { clock }, watch);
+        let (mut unclipped, mut turns) = (vec![Unclipped::NONE; peers], vec![0; peers]);
+        let clipper = clips.map(|scene| Clipper::new(*scene, farm.kernels, &mut unclipped, &mut turns));
+        let outcome =
+            run_master(&mut master, dispatcher, clipper, server, pages, &mut host_link, &mut { clock }, watch);
         drop(host_link);
         (outcome, start.elapsed())
     });

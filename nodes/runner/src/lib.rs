@@ -6,7 +6,7 @@
 #![forbid(unsafe_code)]
 
 use hybray_link::{Event, Link};
-use hybray_scheduler::{Dispatcher, Film, Master, Node, Outcome, PageServer, Progress, Store};
+use hybray_scheduler::{Clipper, Dispatcher, Film, Master, Node, Outcome, PageServer, Progress, Store};
 use hybray_wire::{Message, View, decode};
 
 /// How long a participant that has nothing to do waits for something to arrive, nanoseconds.
@@ -100,11 +100,12 @@ impl<F: FnMut(Progress) -> bool> Watch for F {
     }
 }
 
-/// Runs the master, and a dispatcher beside it if it has one, until the picture has ended. `server` gives out the bytes of
-/// `pages` that nodes ask the host for.
+/// Runs the master, and a dispatcher and a clipper beside it if it has them, until the picture has ended. `server` gives out
+/// the bytes of `pages` that nodes ask the host for.
 pub fn run_master(
     master: &mut Master<'_>,
     mut dispatcher: Option<Dispatcher<'_>>,
+    mut clipper: Option<Clipper<'_, '_>>,
     mut server: PageServer<'_>,
     pages: &[&[u8]],
     link: &mut dyn Link,
@@ -121,6 +122,9 @@ pub fn run_master(
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.handle(from, &view.message, now);
                 }
+                if let Some(clipper) = &mut clipper {
+                    clipper.handle(from, &view.message);
+                }
                 if let Message::Fetch { page } = view.message {
                     server.fetch(from, page);
                 }
@@ -131,11 +135,17 @@ pub fn run_master(
                 if let Some(dispatcher) = &mut dispatcher {
                     dispatcher.lost(peer);
                 }
+                if let Some(clipper) = &mut clipper {
+                    clipper.lost(peer);
+                }
                 server.lost(peer);
                 master.lost(peer);
             }
         });
         busy |= server.serve(link, &|page| pages.get(page as usize).copied()).0;
+        if let Some(clipper) = &mut clipper {
+            busy |= clipper.serve(link);
+        }
         if let Some(page) = server.missing() {
             master.missing(page);
         }

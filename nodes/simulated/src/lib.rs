@@ -22,11 +22,12 @@ pub use hybray_scheduler::Traffic as Exchange;
 pub use hybray_sim::{LinkCounts, LinkModel, Network, NetworkModel, Topology, Traffic};
 pub use machine::{Costs, MACHINES, Machine, MessageCosts, Operations};
 
+use hybray_geometry::simd::Kernels;
 use hybray_link::Peer;
 use hybray_scene::{Line, lines_for, parents};
 use hybray_scheduler::{
-    Asked, Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, PageServer, Plan, PlanError, Progress,
-    Settings, Sizes, TileState, can_draw, light_cache_bytes,
+    Asked, Clipper, Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, PageServer, Plan, PlanError,
+    Progress, Settings, Sizes, TileState, Unclipped, can_draw, light_cache_bytes,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -43,7 +44,7 @@ pub struct Farm<'a> {
     pub nodes: Peer,
     /// Who gives out tiles: the host, or node 1 (POV||Ray, section 2.2).
     pub dispatcher: Peer,
-    /// T, and the least run.
+    /// T, the least run, and when nodes are given tiles.
     pub options: Options,
     /// How nodes work.
     pub settings: Settings,
@@ -64,6 +65,8 @@ pub struct Budget<'a> {
     pub copies: &'a [Vec<u32>],
     /// Where each node's part of the picture begins, in tiles, node 1's first, and the last one ends; none if all are of as many.
     pub parts: &'a [u32],
+    /// Nodes that are given no tiles: entry 0 is the host's. None if it is empty.
+    pub barred: &'a [bool],
 }
 
 /// Why there is no result.
@@ -138,6 +141,8 @@ pub struct Simulated {
     pub host: Traffic,
     /// Time that the host spent on messages, by interval, as [`NodeRun::busy_ns`].
     pub host_busy_ns: Vec<u64>,
+    /// Time that the host spent on clipping, where there are no subhosts.
+    pub host_clipping_ns: u64,
     /// Every directed physical link.
     pub links: Vec<LinkCounts>,
     /// Frames and bytes of each kind of message, to others.
@@ -235,7 +240,11 @@ pub fn simulate_spoiled(
     let workers = (1..).zip(&mut memories).map(|(me, memory)| worker::Worker::new(&shared, me, memory)).collect();
     let (mut asked, mut turns) = (vec![Asked::NONE; peers], vec![0; peers]);
     let server = PageServer::new(&mut asked, &mut turns);
-    let mut world = world::World::new(farm, plan, master, &mut states, server, pages, workers);
+    let (mut unclipped, mut clip_turns) = (vec![Unclipped::NONE; peers], vec![0; peers]);
+    // Where there are no subhosts the host clips.
+    let clipper =
+        (settings.subhosts == Some(0)).then(|| Clipper::new(scene, Kernels::Portable, &mut unclipped, &mut clip_turns));
+    let mut world = world::World::new(farm, plan, master, &mut states, clipper, server, pages, workers);
     spoil(world.network());
     let delay_ns = world.network().delay_ns_max();
     let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, map.len(), delay_ns);

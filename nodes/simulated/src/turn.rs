@@ -21,8 +21,18 @@ pub(crate) struct Said {
 }
 
 /// Kinds of messages, as they are counted.
-pub(crate) const KINDS: [&str; 9] =
-    ["sums of tiles", "rays", "taken", "partial sums", "fetch", "pages", "runs of tiles", "shares", "others"];
+pub(crate) const KINDS: [&str; 10] = [
+    "sums of tiles",
+    "rays",
+    "taken",
+    "partial sums",
+    "fetch",
+    "pages",
+    "runs of tiles",
+    "shares",
+    "cliplists",
+    "others",
+];
 
 fn kind(message: Option<&Message>) -> usize {
     match message {
@@ -34,7 +44,8 @@ fn kind(message: Option<&Message>) -> usize {
         Some(Message::Part { .. }) => 5,
         Some(Message::Tiles { .. } | Message::Done { .. }) => 6,
         Some(Message::Share { .. } | Message::Idle { .. } | Message::Back { .. }) => 7,
-        _ => 8,
+        Some(Message::Clip { .. } | Message::Cliplist { .. }) => 8,
+        _ => 9,
     }
 }
 

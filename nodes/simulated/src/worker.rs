@@ -2,6 +2,7 @@
 
 use crate::machine::Operations;
 use hybray_arena::{Arena, LINE_BYTES};
+use hybray_bintree::walk::Counts;
 use hybray_geometry::simd::Kernels;
 use hybray_link::{Link, Peer};
 use hybray_scheduler::{Cache, Charged, HighWater, Node, Plan, Settings, Traffic};
@@ -108,13 +109,11 @@ impl<'s> Worker<'s> {
     pub fn operations(&self) -> Operations {
         let (walks, counts) = (self.node.walk_counts(), self.node.counts());
         Operations {
-            cells: walks.nodes,
-            blocks: walks.blocks,
-            pages: walks.pages,
             hits: counts.hits,
             rays: counts.primary + counts.secondary + counts.shadow,
             contributions: counts.contributions,
             tiles: self.tiles,
+            ..of_walks(&walks)
         }
     }
 
@@ -124,12 +123,18 @@ impl<'s> Worker<'s> {
     }
 }
 
+/// What walks have counted.
+pub(crate) fn of_walks(walks: &Counts) -> Operations {
+    Operations { cells: walks.nodes, blocks: walks.blocks, pages: walks.pages, ..Operations::default() }
+}
+
 /// Records in a message.
 pub(crate) fn records(message: &Message) -> u64 {
     match message {
         Message::Contributions { .. } => 1,
         Message::Rays { rays, shadows, .. } => u64::from(*rays) + u64::from(*shadows),
         Message::Partials { count } => u64::from(*count),
+        Message::Cliplist { pages, .. } => u64::from(*pages),
         _ => 0,
     }
 }

@@ -6,11 +6,11 @@ use crate::meter::Meter;
 use crate::schedule::{Phase, Schedule};
 use crate::take::{Arrival, Taken, take};
 use crate::turn::{KINDS, Said, Turn};
-use crate::worker::Worker;
+use crate::worker::{Worker, of_walks};
 use crate::{Bound, Farm, NodeRun, SimulateError, Simulated};
 use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
+use hybray_scheduler::{Clipper, Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
 use hybray_sim::Network;
 use hybray_wire::Message;
 
@@ -39,6 +39,10 @@ pub(crate) struct World<'a, 'm, 's> {
     network: Network,
     master: Master<'m>,
     dispatcher: Dispatcher<'m>,
+    /// At the host, where there are no subhosts; what it has counted, and the time spent on that.
+    clipper: Option<Clipper<'m, 's>>,
+    clipped: Operations,
+    clipping_ps: u64,
     /// At the host, for pages whose owners are lost.
     server: PageServer<'m>,
     pages: &'a [&'a [u8]],
@@ -67,6 +71,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
         plan: Plan,
         master: Master<'m>,
         states: &'m mut [NodeState],
+        clipper: Option<Clipper<'m, 's>>,
         server: PageServer<'m>,
         pages: &'a [&'a [u8]],
         workers: Vec<Worker<'s>>,
@@ -79,7 +84,11 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             dispatcher: Dispatcher::new(states, farm.options)
                 .on(farm.dispatcher)
                 .biased(farm.settings.policy != Policy::DemandDriven)
-                .with_parts(farm.budget.map_or(&[], |budget| budget.parts)),
+                .with_parts(farm.budget.map_or(&[], |budget| budget.parts))
+                .barring(farm.budget.map_or(&[][..], |budget| budget.barred)),
+            clipper,
+            clipped: Operations::default(),
+            clipping_ps: 0,
             server,
             pages,
             seats: workers
@@ -159,13 +168,16 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
     }
 
     fn take_host(&mut self, now: u64, watch: &mut dyn FnMut(Progress) -> bool) {
-        let Self { network, master, dispatcher, server, farm, gathered_ns, .. } = self;
+        let Self { network, master, dispatcher, clipper, server, farm, gathered_ns, .. } = self;
         let dispatches = farm.dispatcher == HOST;
         let Taken { spent_ps, frames, .. } = take(network, farm.machine, HOST, now, |arrival, now| {
             match arrival {
                 Arrival::Message { from, view } => {
                     if dispatches {
                         dispatcher.handle(from, &view.message, now);
+                    }
+                    if let Some(clipper) = clipper {
+                        clipper.handle(from, &view.message);
                     }
                     if let Message::Fetch { page } = view.message {
                         server.fetch(from, page);
@@ -176,6 +188,9 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
                 Arrival::Lost { peer } => {
                     if dispatches {
                         dispatcher.lost(peer);
+                    }
+                    if let Some(clipper) = clipper {
+                        clipper.lost(peer);
                     }
                     server.lost(peer);
                     master.lost(peer);
@@ -254,7 +269,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
     }
 
     fn send(&mut self, me: Peer, now: u64, busy: bool) {
-        let Self { network, master, dispatcher, server, pages, seats, farm, gaps, .. } = self;
+        let Self { network, master, dispatcher, clipper, server, pages, seats, farm, gaps, .. } = self;
         let machine = farm.machine;
         let seat = usize::from(me).checked_sub(1).map(|number| &mut seats[number]);
         let mut no_run = 0;
@@ -271,6 +286,9 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             }
             None => {
                 server.serve(&mut turn, &|page| pages.get(page as usize).copied());
+                if let Some(clipper) = clipper {
+                    clipper.serve(&mut turn);
+                }
                 if let Some(page) = server.missing() {
                     master.missing(page);
                 }
@@ -281,6 +299,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             dispatcher.poll(&mut turn, now);
         }
         let Said { spent_ps, frames, first_tiles_ns, kinds } = turn.said;
+        let computing_ps = self.clipping_ps(me);
         for (all, (frames, bytes)) in self.kinds.iter_mut().zip(kinds) {
             *all = (all.0 + frames, all.1 + bytes);
         }
@@ -290,7 +309,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             self.meter.begin(first);
             self.gaps.begin(first);
         }
-        let spent_ns = self.nanoseconds(me, spent_ps);
+        let spent_ns = self.nanoseconds(me, spent_ps + computing_ps);
         if let Some(number) = usize::from(me).checked_sub(1) {
             self.seats[number].messaging_ns += spent_ps / 1000;
         }
@@ -304,6 +323,24 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
         } else {
             self.schedule.sleep(me, now);
         }
+    }
+
+    /// What clipping for others took, picoseconds: it is done where there is room for the answer.
+    fn clipping_ps(&mut self, me: Peer) -> u64 {
+        let costs = &self.farm.machine.costs;
+        let Some(number) = usize::from(me).checked_sub(1) else {
+            let clipped = self.clipper.as_ref().map_or(Operations::default(), |clipper| of_walks(&clipper.counts()));
+            let spent_ps = costs.of(&clipped.since(&self.clipped));
+            self.clipped = clipped;
+            self.clipping_ps += spent_ps;
+            return spent_ps;
+        };
+        let seat = &mut self.seats[number];
+        let operations = seat.worker.operations();
+        let spent_ps = costs.of(&operations.since(&seat.operations));
+        seat.operations = operations;
+        seat.computing_ns += spent_ps / 1000;
+        spent_ps
     }
 
     fn is_stuck(&mut self, now: u64) -> bool {
@@ -364,6 +401,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             nodes: nodes.collect(),
             host: network.traffic(HOST),
             host_busy_ns,
+            host_clipping_ns: self.clipping_ps / 1000,
             links: network.links().collect(),
             kinds: KINDS.into_iter().zip(self.kinds).collect(),
             frames: network.delivered(),

@@ -7,7 +7,7 @@ use hybray::build::Settings as Build;
 use hybray::model::Settings as Wanted;
 use hybray::prepare::Prepared;
 use hybray::simulate::runs::{Experiment, RunError};
-use hybray_scheduler::policy::Policy;
+use hybray_scheduler::policy::{Criterion, Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Sizes};
 use hybray_simulated::{Machine, NodeRun, Simulated};
 use hybray_tests::scene;
@@ -53,6 +53,14 @@ pub struct Job {
     pub in_system: Option<u32>,
     /// Tiles of a pyramid, if it is not the default.
     pub bundle_tiles: Option<u8>,
+    /// When nodes are given tiles.
+    pub tiles: Tiles,
+    /// Which nodes are.
+    pub criterion: Criterion,
+    /// Subhosts, if not every node clips for itself.
+    pub subhosts: Option<u16>,
+    /// Nodes that have nothing to do at the end are given rays of others.
+    pub take_over: bool,
 }
 
 impl Job {
@@ -76,6 +84,10 @@ impl Job {
             granularity: None,
             in_system: None,
             bundle_tiles: None,
+            tiles: Tiles::Dynamic,
+            criterion: Criterion::All,
+            subhosts: None,
+            take_over: true,
         }
     }
 
@@ -92,7 +104,9 @@ impl Job {
 
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
-        Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..self.clone() }
+        let same = Self { tiles: Tiles::Dynamic, criterion: Criterion::All, take_over: true, ..self.clone() };
+        let same = Self { subhosts: None, ..same };
+        Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..same }
     }
 }
 
@@ -119,11 +133,15 @@ pub struct Figures {
     pub fetched: u64,
     /// The node that needed most, bytes.
     pub memory_high_water: u64,
+    /// Time that the host spent on clipping for all nodes, virtual seconds.
+    pub clipping_seconds: f64,
+    /// Nodes that could be given tiles.
+    pub with_tiles: usize,
     film: u64,
 }
 
 impl Figures {
-    fn of(run: &Simulated) -> Self {
+    fn of(run: &Simulated, with_tiles: usize) -> Self {
         let sum = |of: &dyn Fn(&NodeRun) -> u64| run.nodes.iter().map(of).sum::<u64>();
         let ray_messages = run.kinds.iter().find(|(kind, _)| *kind == "rays").map_or(0, |(_, (frames, _))| *frames);
         let fixed = run.plan.sum().total_bytes() - run.plan.lines as u64 * 64;
@@ -138,6 +156,8 @@ impl Figures {
             ray_messages,
             fetched: sum(&|node| node.exchange.fetched),
             memory_high_water: run.nodes.iter().map(|node| fixed + node.high_water.page_bytes).max().unwrap_or(0),
+            clipping_seconds: run.host_clipping_ns as f64 * 1e-9,
+            with_tiles,
             film: run.film,
         }
     }
@@ -150,6 +170,8 @@ pub enum Without {
     NotYet,
     /// The scene does not fit: `o.m.` in the papers' tables.
     Memory,
+    /// No node would be given tiles.
+    Nobody,
     /// It went wrong.
     Failed(String),
 }
@@ -160,6 +182,7 @@ impl Without {
         match self {
             Self::NotYet => String::new(),
             Self::Memory => "o.m.".to_owned(),
+            Self::Nobody => "no node".to_owned(),
             Self::Failed(_) => "failed".to_owned(),
         }
     }
@@ -276,12 +299,15 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     let machine = Machine::named(job.machine).ok_or_else(|| failed(format!("no machine {}", job.machine)))?;
     let mut experiment = Experiment::new(prepared, &scene, &frame, machine);
     experiment.dispatcher = job.is_dispatched_by_node.into();
-    experiment.options = Options { spread: job.spread.map(f32::from), atomic: job.atomic };
+    let Job { atomic, tiles, take_over, criterion, .. } = *job;
+    experiment.options = Options { spread: job.spread.map(f32::from), atomic, tiles, take_over };
+    (experiment.criterion, experiment.voxels) = (criterion, job.voxels.parse().map_err(failed)?);
     let settings = machine.settings(job.policy);
     experiment.settings = hybray_scheduler::Settings {
         granularity: job.granularity.unwrap_or(settings.granularity),
         in_system: job.in_system.unwrap_or(settings.in_system),
         bundle_tiles: job.bundle_tiles.unwrap_or(settings.bundle_tiles),
+        subhosts: job.subhosts,
         ..settings
     };
     let scene_bytes = Sizes::of(&scene).pages_bytes;
@@ -294,9 +320,13 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
         turns -= 1;
         turns > 0
     };
+    let fit = experiment.fit(job.nodes).ok().flatten();
+    let barred = fit.and_then(|fit| experiment.barred(&fit.owners, job.nodes).ok());
+    let barred = barred.map_or(0, |barred| barred.iter().filter(|&&barred| barred).count());
     match experiment.simulated(job.nodes, goes_on) {
-        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run)),
+        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run, usize::from(job.nodes) - barred)),
         Ok(run) => Err(failed(format!("{:?}", run.outcome))),
+        Err(RunError::NoCandidate(_)) => Err(Without::Nobody),
         Err(RunError::NoFit(_)) => Err(Without::Memory),
         Err(error) => Err(failed(error.to_string())),
     }

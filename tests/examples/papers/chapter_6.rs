@@ -1,7 +1,7 @@
 //! Chapter 6 of the 1995 report.
 
-use anyhow::Result;
-use hybray_scheduler::policy::Policy;
+use anyhow::{Context as _, Result};
+use hybray_scheduler::policy::{Criterion, Policy, Tiles};
 
 use crate::bench::{Bench, Job};
 use crate::published::{Published, Row};
@@ -9,8 +9,6 @@ use crate::table::{Table, megabytes, per_cent};
 
 /// What is said of a simulated run, six columns.
 const RUN: [&str; 6] = ["s", "speed-up", "eff. %", "busy %", "messages", "MB"];
-/// A cell of an experiment that cannot be made, and why is said on the page.
-const NOT_SIMULATED: &str = "not simulated";
 
 /// The cells of `job`, as [`RUN`] has them.
 fn run(bench: &Bench, job: &Job) -> Vec<String> {
@@ -44,48 +42,71 @@ fn table(first: &[&str], groups: &[&str]) -> Table {
     Table::new(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Table 6.2: which nodes are given tiles, and when.
+/// Table 6.2: which nodes are given tiles, and when. The report has no take-over at the end of a picture.
 pub fn criteria(bench: &Bench, published: &Published) -> Result<String> {
-    let first = ["criterion", "demand-driven nodes", "pixel count: s", "busy %", "dynamic: s", "busy %"];
-    let mut table = table(&first, &["`hybrid-1995`", "`hybrid`"]);
+    let first = ["criterion", "nodes with tiles", "pixel count: s", "busy %", "dynamic: s", "busy %", "ours: nodes"];
+    let names = ["pixel count", "dynamic", "static", "dynamic and take-over"];
+    let mut columns_of: Vec<String> = first.map(str::to_owned).to_vec();
+    columns_of.extend(names.iter().flat_map(|name| [format!("{name}: s"), "eff. %".to_owned(), "busy %".to_owned()]));
+    let mut table = Table::new(&columns_of.iter().map(String::as_str).collect::<Vec<_>>());
     for row in published.table("t6_2_scheduling_criteria")? {
-        let mut cells_of_row = columns(
+        let mut line = columns(
             row,
             &["criterion", "demand_driven_processes", "pixel_count_s", "pixel_count_eff", "dynamic_s", "dynamic_eff"],
         )?;
-        if row.text("criterion")? == "all processes" {
-            let job = Job::of_1995("paper:balls", 16);
-            cells_of_row.extend(run(bench, &job.clone().in_1995(Policy::Hybrid1995, "4x4")));
-            cells_of_row.extend(run(bench, &job));
-        } else {
-            cells_of_row.extend(cells(NOT_SIMULATED));
-            cells_of_row.extend(cells("–"));
+        let job = Job::of_1995("paper:balls", 16).in_1995(Policy::Hybrid1995, "4x4");
+        let criterion = criterion(row.text("criterion")?)?;
+        let pixels = job.in_system.unwrap_or_default();
+        let ways = [
+            (Tiles::PixelCount { pixels }, false),
+            (Tiles::Dynamic, false),
+            (Tiles::Static, false),
+            (Tiles::Dynamic, true),
+        ];
+        let runs = ways.map(|(tiles, take_over)| Job { tiles, take_over, criterion, ..job.clone() });
+        let nodes = bench.figures(&runs[0]).map_or_else(|without| without.cell(), |run| run.with_tiles.to_string());
+        line.push(nodes);
+        for job in &runs {
+            line.extend(match bench.compared(job) {
+                Ok(found) => {
+                    [format!("{:.2}", found.run.seconds), per_cent(found.efficiency), per_cent(found.run.busy)]
+                }
+                Err(without) => [without.cell(), String::new(), String::new()],
+            });
         }
-        table.row(cells_of_row);
+        table.row(line);
     }
     Ok(table.finish())
 }
 
-/// Table 6.3: subhosts and the size of a pyramid.
+/// The criterion that the report calls so.
+fn criterion(name: &str) -> Result<Criterion> {
+    Ok(match name {
+        "all processes" => Criterion::All,
+        "all but host" => Criterion::AllButHost,
+        "location" => Criterion::Location,
+        _ => Criterion::Objects(name.trim_start_matches("objects <= ").parse().with_context(|| name.to_owned())?),
+    })
+}
+
+/// Table 6.3: subhosts and the size of a pyramid. As many subhosts as nodes: every node clips for itself.
 pub fn subhosts(bench: &Bench, published: &Published) -> Result<String> {
     let first = ["model", "subhosts", "8 x 8: s", "busy %", "16 x 16: s", "busy %"];
     let groups = ["`hybrid-1995`, 8 x 8", "`hybrid-1995`, 16 x 16", "`hybrid`, 8 x 8", "`hybrid`, 16 x 16"];
-    let mut table = table(&first, &groups);
+    let clipping = ["`hybrid-1995`, clipping at the host, 8 x 8: s", "16 x 16: s"];
+    let mut table = table(&[&first[..], &clipping].concat(), &groups);
     for row in published.table("t6_3_subhosts")? {
         let mut line = columns(row, &["model", "subhosts", "s_8x8", "eff_8x8", "s_16x16", "eff_16x16"])?;
-        // Every node clips for itself: as many subhosts as nodes.
-        if row.number("subhosts")? == 16 {
-            let job = Job::of_1995(&format!("paper:{}", row.text("model")?), 16);
-            for policy in [Policy::Hybrid1995, Policy::Hybrid] {
-                for tiles in [1, 4] {
-                    let published = job.clone().in_1995(policy, "4x4");
-                    let job = if policy == Policy::Hybrid { job.clone() } else { published };
-                    line.extend(run(bench, &Job { bundle_tiles: Some(tiles), ..job }));
-                }
-            }
-        } else {
-            (0..groups.len()).for_each(|_| line.extend(cells(NOT_SIMULATED)));
+        let job = Job::of_1995(&format!("paper:{}", row.text("model")?), 16);
+        let subhosts = Some(row.number("subhosts")?).filter(|&subhosts| subhosts < job.nodes);
+        let published = job.clone().in_1995(Policy::Hybrid1995, "4x4");
+        let of = |job: &Job, tiles| Job { bundle_tiles: Some(tiles), subhosts, ..job.clone() };
+        let jobs = [of(&published, 1), of(&published, 4), of(&job, 1), of(&job, 4)];
+        for job in &jobs[..2] {
+            let seconds = bench.figures(job).map(|run| format!("{:.3}", run.clipping_seconds));
+            line.push(seconds.unwrap_or_else(|without| without.cell()));
         }
+        jobs.iter().for_each(|job| line.extend(run(bench, job)));
         table.row(line);
     }
     Ok(table.finish())

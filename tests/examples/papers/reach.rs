@@ -228,6 +228,8 @@ fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job, light_caches_fit: bool)
         ("nothing forwarded: `demand-driven`", changed(&|job| job.policy = Policy::DemandDriven)),
         ("pyramids of 8 x 8 pixels instead of 16 x 16", changed(&|job| job.bundle_tiles = Some(1))),
         ("tiles given out by a node instead of the host", changed(&|job| job.is_dispatched_by_node = true)),
+        ("no subhosts: the host clips for all", changed(&|job| job.subhosts = Some(0))),
+        ("no take-over at the end of the picture", changed(&|job| job.take_over = false)),
         (
             "a run is one tile, always (no `W / (1 + T (N - 1))`)",
             changed(&|job| {

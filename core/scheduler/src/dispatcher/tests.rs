@@ -58,7 +58,7 @@ impl Link for Wire {
     fn wait(&mut self, _: u64) {}
 }
 
-const FIXED: Options = Options { spread: Some(1.0), atomic: Some(4) };
+const FIXED: Options = Options { spread: Some(1.0), atomic: Some(4), tiles: Tiles::Dynamic, take_over: true };
 const HELLO: Message = Message::Hello { version: 1, scene: 1 };
 
 /// A picture of `tiles` tiles in one row.
@@ -204,7 +204,7 @@ fn what_there_is_no_room_for_is_given_later_and_once() {
 #[test]
 fn what_a_lost_node_had_is_shared_by_the_others() {
     let (mut states, mut wire) = (states(3), Wire::new());
-    let mut d = dispatcher(&mut states, 96, Options { spread: Some(1.0), atomic: Some(24) });
+    let mut d = dispatcher(&mut states, 96, Options { spread: Some(1.0), atomic: Some(24), ..Options::default() });
     d.poll(&mut wire, 0);
     assert_eq!(wire.take(), [(1, 0, 24, 0), (2, 24, 24, 0), (3, 48, 24, 0)]);
     d.lost(1);
@@ -301,14 +301,17 @@ fn the_least_run_is_worth_its_messages() {
         assert_eq!(d.atomic(), expected, "{tiles} tiles of {cost} ns, messages of {overhead} ns");
     }
     let mut states = states(2);
-    assert_eq!(dispatcher(&mut states, 100, Options { atomic: Some(0), spread: None }).atomic(), 1);
+    assert_eq!(
+        dispatcher(&mut states, 100, Options { atomic: Some(0), spread: None, ..Options::default() }).atomic(),
+        1
+    );
 }
 
 #[test]
 fn the_spread_is_learned_within_bounds() {
     for (cheap, dear, expected) in [(100, 100, 2.5), (100, 400, 4.0), (100, 900_000, 16.0), (0, 100, 2.5)] {
         let (mut states, mut wire) = (states(2), Wire::new());
-        let mut d = dispatcher(&mut states, 3200, Options { spread: None, atomic: Some(4) });
+        let mut d = dispatcher(&mut states, 3200, Options { spread: None, atomic: Some(4), ..Options::default() });
         for cost in [cheap, cheap, dear, dear] {
             assert_eq!(d.spread(), 2.5, "less than two runs a node are too few to learn from");
             d.poll(&mut wire, 0);
@@ -325,7 +328,7 @@ fn the_spread_is_learned_within_bounds() {
 #[test]
 fn the_last_tiles_are_not_for_a_slow_node() {
     let (mut states, mut wire) = (states(3), Wire::new());
-    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4) });
+    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4), ..Options::default() });
     d.poll(&mut wire, 0);
     [(1, 100), (2, 100), (3, 1_000)].iter().for_each(|&(node, cost)| done(&mut d, node, 4 * cost, 4_000));
     d.nodes[0].next = 56;
@@ -367,7 +370,7 @@ fn a_node_proves_itself_before_it_gets_much() {
 #[test]
 fn only_the_host_begins_and_only_the_oldest_run_is_done() {
     let (mut states, mut wire) = (states(1), Wire::new());
-    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4) });
+    let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4), ..Options::default() });
     d.handle(1, &begin(2), 0);
     assert_eq!(d.tiles, 64);
     d.poll(&mut wire, 0);
@@ -502,5 +505,145 @@ fn what_comes_back_may_be_of_the_run_before() {
             dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }, 2);
         }
         assert!(dispatcher.is_idle());
+    }
+}
+
+/// A tile of a node comes back to the film.
+fn comes_back(d: &mut Dispatcher<'_>, node: Peer, tile: u32) {
+    let message = Message::Contributions { tile, epoch: 0, width: 8, height: 8, rays: 1, entry: 1 };
+    d.handle(node, &message, 5);
+}
+
+#[test]
+fn pixels_are_counted_and_words_are_not_heard() {
+    let (mut states, mut wire) = (states(2), Wire::new());
+    // 300 pixels are five tiles: runs of four, and one more where less than five have not come back.
+    let tiles = Tiles::PixelCount { pixels: 300 };
+    let mut d = dispatcher(&mut states, 64, Options { tiles, ..FIXED });
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 8, 0), (2, 8, 8, 0)]);
+    let (first, second) = (Message::Done { first: 0, count: 8, nanoseconds: 1 }, [7, 1, 4]);
+    d.handle(1, &first, 1);
+    d.poll(&mut wire, 1);
+    assert_eq!(wire.take(), [], "a run that is done is no reason for another");
+    second.into_iter().for_each(|tile| comes_back(&mut d, 1, tile));
+    // The other's tiles, and none at all, are not this node's.
+    [9, 63, u32::MAX].into_iter().for_each(|tile| comes_back(&mut d, 1, tile));
+    d.poll(&mut wire, 2);
+    assert_eq!(wire.take(), [], "five are still there");
+    comes_back(&mut d, 1, 0);
+    d.poll(&mut wire, 3);
+    assert_eq!(wire.take(), [(1, 16, 4, 0)]);
+    assert_eq!((d.nodes[1].in_hand(), d.nodes[2].in_hand()), (8, 8));
+    // All of the second run come back before the last of the first.
+    (16..20).for_each(|tile| comes_back(&mut d, 1, tile));
+    d.handle(1, &Message::Done { first: 16, count: 4, nanoseconds: 1 }, 4);
+    assert_eq!((d.nodes[1].runs.len(), d.nodes[1].in_hand()), (1, 4));
+    // Who is lost leaves everything that it had, under a new epoch.
+    d.lost(1);
+    d.poll(&mut wire, 5);
+    assert_eq!(wire.take(), [], "the other has enough");
+    (8..16).for_each(|tile| comes_back(&mut d, 2, tile));
+    d.poll(&mut wire, 6);
+    assert_eq!(wire.take()[0], (2, 0, 8, 1));
+}
+
+/// Frames that are lost hold nothing up for ever, whether tiles are left or the film asks again.
+#[test]
+fn tiles_that_never_come_back_are_given_up() {
+    let (mut states, mut wire) = (states(2), Wire::new());
+    let mut d = dispatcher(&mut states, 16, Options { tiles: Tiles::PixelCount { pixels: 1 }, ..FIXED });
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (2, 4, 4, 0)]);
+    d.poll(&mut wire, 2 * SILENCE);
+    assert_eq!(wire.take(), [], "who is at work is not silent");
+    d.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 1 }, SILENCE);
+    d.poll(&mut wire, 2 * SILENCE);
+    assert_eq!(wire.take(), []);
+    d.poll(&mut wire, 2 * SILENCE + 1);
+    assert_eq!(wire.take(), [(1, 8, 4, 0)]);
+    (8..12).for_each(|tile| comes_back(&mut d, 1, tile));
+    d.poll(&mut wire, 2 * SILENCE + 2);
+    assert_eq!(wire.take(), [(1, 12, 4, 0)]);
+    for (node, first) in [(1, 8), (1, 12), (2, 4)] {
+        assert!(!d.is_idle());
+        d.handle(node, &Message::Done { first, count: 4, nanoseconds: 1 }, 2 * SILENCE + 3);
+    }
+    assert!(d.is_idle(), "all is done, though not all has come back");
+    again(&mut d, 5, 1);
+    again(&mut d, NO_MORE, 0);
+    d.poll(&mut wire, 2 * SILENCE + 4);
+    assert_eq!(wire.take(), [(1, 5, 1, 1)]);
+}
+
+#[test]
+fn a_static_picture_is_divided_once() {
+    let (mut states, mut wire) = (states(3), Wire::new());
+    let mut d = Dispatcher::new(&mut states, Options { tiles: Tiles::Static, ..FIXED });
+    d.handle(HOST, &begin(64), 0);
+    d.handle(2, &HELLO, 0);
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(2, 20, 20, 0)]);
+    done(&mut d, 2, 10, 10);
+    // There is no room at first: nobody else may have what is given back.
+    wire.room = 0;
+    [1, 3].iter().for_each(|&node| d.handle(node, &HELLO, 0));
+    d.poll(&mut wire, 11);
+    wire.room = 9;
+    d.poll(&mut wire, 12);
+    assert_eq!(wire.take(), [(1, 0, 20, 0), (3, 40, 24, 0)]);
+    done(&mut d, 3, 10, 13);
+    d.poll(&mut wire, 13);
+    assert_eq!(wire.take(), [], "that is that");
+    d.lost(1);
+    d.poll(&mut wire, 14);
+    assert_eq!(wire.take()[..2], [(2, 0, 10, 1), (3, 10, 5, 1)]);
+
+    // Who is lost before it had its part had it to give all the same.
+    let mut states = super::tests::states(2);
+    let mut d = Dispatcher::new(&mut states, Options { tiles: Tiles::Static, ..FIXED });
+    d.handle(HOST, &begin(16), 0);
+    d.lost(1);
+    d.handle(2, &HELLO, 0);
+    d.poll(&mut wire, 0);
+    let mut tiles: Vec<u32> = wire.take().iter().flat_map(|run| run.1..run.1 + run.2).collect();
+    tiles.sort_unstable();
+    assert_eq!(tiles, (0..16).collect::<Vec<_>>());
+}
+
+#[test]
+fn who_is_barred_is_given_tiles_only_when_nobody_else_is_left() {
+    for tiles in [Tiles::Dynamic, Tiles::Static, Tiles::PixelCount { pixels: 256 }] {
+        for biased in [false, true] {
+            let (mut states, mut wire) = (states(3), Wire::new());
+            let mut d = Dispatcher::new(&mut states, Options { tiles, take_over: false, ..FIXED }).biased(biased);
+            d = d.barring(&[false, true, false, true]);
+            d.handle(HOST, &begin(32), 0);
+            [1, 2, 3].iter().for_each(|&node| d.handle(node, &HELLO, 0));
+            d.poll(&mut wire, 0);
+            let runs = wire.take();
+            assert!(!runs.is_empty() && runs.iter().all(|run| run.0 == 2), "{tiles:?}: {runs:?}");
+            assert_eq!(runs.iter().map(|run| run.2).sum::<u32>(), 32, "alone it need not share: {tiles:?}");
+            d.lost(2);
+            d.poll(&mut wire, 1);
+            let mut nodes: Vec<Peer> = wire.take().iter().map(|run| run.0).collect();
+            nodes.dedup();
+            assert_eq!(nodes[..2], [1, 3], "{tiles:?}");
+            assert!(wire.shared.is_empty());
+        }
+    }
+    // Nobody at all would be nobody's picture.
+    let mut states = states(2);
+    let d = Dispatcher::new(&mut states, FIXED).barring(&[false, true, true]);
+    assert!(d.nodes.iter().all(|node| !node.barred));
+}
+
+#[test]
+fn nobody_shares_if_that_is_off() {
+    for take_over in [true, false] {
+        let (mut states, mut wire) = (states(3), Wire::new());
+        let mut d = dispatcher(&mut states, 8, Options { take_over, ..FIXED });
+        d.poll(&mut wire, 0);
+        assert_eq!(wire.shared.len(), usize::from(take_over));
     }
 }

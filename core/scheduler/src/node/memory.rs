@@ -4,6 +4,7 @@ use super::pool::{PageState, Pool};
 use super::tiles::OpenTile;
 use super::{BUNDLE, Peers, Place};
 use crate::DEPTH_MAX;
+use crate::clips::{Clips, Unclipped};
 use crate::server::{Asked, PageServer};
 use hybray_arena::{Arena, List, Ring, Short, Slab, Sum};
 use hybray_bintree::walk::{Hit, Stack, Walked};
@@ -55,6 +56,7 @@ pub struct NodeMemory<'m> {
     pub(super) owing: Ring<'m, u16>,
     pub(super) peers: Peers<'m>,
     pub(super) server: PageServer<'m>,
+    pub(super) clips: Clips<'m>,
 }
 
 /// The terms, in order: `$do!(name, type, count, value)` for each.
@@ -87,6 +89,8 @@ macro_rules! terms {
             $do!("what peers ask for", Asked, l.peers, || Asked::NONE),
             $do!("peers to send pages to", u16, l.peers, || 0u16),
             $do!("peers to send rays to", u16, l.peers, || 0u16),
+            $do!("bundles that peers want clipped", Unclipped, l.peers, || Unclipped::NONE),
+            $do!("peers to send cliplists to", u16, l.peers, || 0u16),
         )
     }};
 }
@@ -119,7 +123,7 @@ impl<'m> NodeMemory<'m> {
         let t = terms!(limits, take);
         let (bundle, lane, tiles, rays, ray_links, pages, wanted, ready) = (t.0, t.1, t.2, t.3, t.4, t.5, t.6, t.7);
         let (partials, partial_links, owed, owing) = (t.8, t.9, t.10, t.11);
-        let (peers, answers, asked, turns, sends) = (t.12, t.13, t.14, t.15, t.16);
+        let (peers, answers, asked, turns, sends, unclipped, clip_turns) = (t.12, t.13, t.14, t.15, t.16, t.17, t.18);
         Ok(Self {
             bundle: &mut bundle[0],
             lane,
@@ -130,6 +134,7 @@ impl<'m> NodeMemory<'m> {
             owing: Ring::new(owing),
             peers: Peers::new(peers, Ring::new(answers), Ring::new(sends)),
             server: PageServer::new(asked, turns),
+            clips: Clips::new(unclipped, Ring::new(clip_turns)),
         })
     }
 }

@@ -22,9 +22,11 @@ pub use memory::{Limits, NodeMemory};
 pub use picture::can_draw;
 pub use store::{All, Backing, Cache, Charged, Landed, Own, Place as CachePlace, Store};
 
+pub(crate) use ahead::clip;
 pub(crate) use peers::{PeerState, Peers};
+pub(crate) use picture::Picture;
 
-use crate::policy::{LinkCost, Policy};
+use crate::policy::{LinkCost, Policy, subhost};
 use crate::{rules, send};
 use ahead::Ahead;
 use hybray_bintree::walk::{FROM_ROOT, Hit};
@@ -37,7 +39,6 @@ use hybray_shading::{id, sample_offset};
 use hybray_tracer::{Lane, Scene, Walker};
 use hybray_wire::{Counts, Message, RayKind, RayRecord, TILE, View};
 use memory::Bundle;
-use picture::Picture;
 use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
 
 /// Tiles of a bundle.
@@ -45,7 +46,8 @@ const TILES: usize = 4;
 /// Primary rays of a bundle at most.
 pub const BUNDLE: usize = TILES * TILE_PIXELS;
 /// Runs that wait.
-const RUNS: usize = 4;
+const RUNS: usize = crate::dispatcher::RUNS_MAX;
+const NO_RUNS: heapless::Deque<Run, RUNS> = heapless::Deque::new();
 /// Pages that may be on their way here, the lane's not counted.
 pub const REQUESTS_MAX: usize = 16;
 /// Wanted pages that are looked at in one call.
@@ -76,6 +78,9 @@ pub struct Settings {
     pub requests: u8,
     /// Shadow rays are tested against all pages at hand first, and what is left of them is forwarded: with light caches.
     pub lights_first: bool,
+    /// Nodes that clip bundles for themselves and as many others (table 6.3); with none the host does, and every node does
+    /// if nothing is said.
+    pub subhosts: Option<Peer>,
 }
 
 impl Default for Settings {
@@ -91,6 +96,7 @@ impl Default for Settings {
             in_system: 4096,
             requests: 8,
             lights_first: false,
+            subhosts: None,
         }
     }
 }
@@ -245,6 +251,9 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         settings: Settings,
         memory: NodeMemory<'m>,
     ) -> Self {
+        // Where every page is at hand, nothing is clipped for.
+        let clips = |nodes: usize| subhost(me, nodes as Peer, settings.subhosts);
+        let subhost = memory.peers.len().checked_sub(1).map(clips).filter(|&subhost| subhost != me);
         Self {
             scene,
             store,
@@ -260,7 +269,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             stage: Stage::Idle,
             depth: 0,
             aside: None,
-            ahead: Ahead::default(),
+            ahead: Ahead::new(subhost),
             requests: heapless::Vec::new(),
             looked_at: 0,
             done: heapless::Deque::new(),
@@ -348,7 +357,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     .picture
                     .as_ref()
                     .is_some_and(|p| count > 0 && first.checked_add(count).is_some_and(|end| end <= p.map.len()));
-                // A dispatcher never has more than two runs at a node; one that does is not heard.
+                // A dispatcher never has more runs at a node than that; one that does is not heard.
                 if fits && self.runs.push_back(Run { first, count, epoch, done: 0, nanoseconds: 0 }).is_ok() {
                     self.runs_given += 1;
                 }
@@ -360,6 +369,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
             Message::Share { with } if from == self.dispatcher && !self.stopped => self.share(with),
             Message::Fetch { page } => self.memory.server.fetch(from, page),
+            Message::Clip { first, count } => self.memory.clips.ask(from, first, count),
+            Message::Cliplist { first, .. } => {
+                self.ahead.come(from, first, view.body, self.scene.resident.directory.entries.len());
+            }
             Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
             _ => {}
         }
@@ -388,6 +401,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.wait_again(outbox);
         self.wait_again(flight);
         self.memory.server.lost(peer);
+        self.memory.clips.lost(peer);
+        self.ahead.lost(peer);
         if let Some(owed) = self.memory.owed.get_mut(usize::from(peer)) {
             let mut owed = core::mem::take(owed);
             while self.memory.partials.pop_front(&mut owed).is_some() {}
@@ -544,7 +559,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                         let kernels = self.kernels;
                         self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
                     }
-                    let begun = if room { begin(picture, &self.runs, sums.tiles, square_from) } else { None };
+                    // A bundle waits for its cliplist; a tile that is traced again has none.
+                    let has_list = pool.capacity() == 0 || next.is_some_and(|next| self.ahead.has(next));
+                    let runs = if has_list { &self.runs } else { &NO_RUNS };
+                    let begun = if room { begin(picture, runs, sums.tiles, square_from) } else { None };
                     let Some(begun) = begun else {
                         units -= 1;
                         break;
@@ -592,6 +610,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             let (parts, pages) = self.memory.server.serve(link, &|page| store.bytes(page));
             self.traffic.served += pages;
             sent |= parts;
+            sent |= self.clip(link);
+            sent |= self.ahead.ask(link);
             self.decide(now);
             sent |= self.ask(link);
             sent |= self.forward(link, now);
@@ -630,6 +650,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             sent |= !self.helped;
         }
         sent
+    }
+
+    /// Makes cliplists for the nodes that this one is the subhost of.
+    fn clip(&mut self, link: &mut dyn Link) -> bool {
+        let Self { picture, scene, kernels, memory, walk_counts, .. } = self;
+        let Some(picture) = picture else { return false };
+        let scratch = &mut memory.bundle.scratch;
+        memory.clips.serve(link, &picture.map, &mut |tiles| clip(picture, scene, *kernels, tiles, scratch, walk_counts))
     }
 
     fn greet(&mut self, link: &mut dyn Link) -> bool {

@@ -55,6 +55,11 @@ impl<'m> Peers<'m> {
         Self { all, answers, sends }
     }
 
+    /// How many there are, the host included.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
     /// What is known of a peer.
     pub fn get(&mut self, peer: Peer) -> Option<&mut PeerState> {
         self.all.get_mut(usize::from(peer))

@@ -6,7 +6,7 @@ use hybray_shading::{Camera, Filter};
 use hybray_wire::{Frame, TileMap};
 
 /// What a node makes of a [`Frame`].
-pub(super) struct Picture {
+pub(crate) struct Picture {
     pub frame: Frame,
     pub map: TileMap,
     pub camera: Camera,

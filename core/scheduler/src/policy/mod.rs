@@ -1,9 +1,16 @@
-//! Forward or fetch? Pure functions: what is known in, a choice out (DESIGN section 9).
+//! Forward or fetch? Who is given tiles, and when? Pure functions: what is known in, a choice out (DESIGN section 9).
 
+mod criterion;
 mod data_parallel;
 mod demand_driven;
 mod hybrid;
 mod hybrid_1995;
+mod subhosts;
+mod tiles;
+
+pub use criterion::{Candidate, Criterion, admits};
+pub use subhosts::subhost;
+pub use tiles::{Hand, Tiles, gives, missing};
 
 use hybray_wire::RayKind;
 

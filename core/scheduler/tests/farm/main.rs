@@ -15,6 +15,7 @@ mod world;
 
 use common::Rng;
 use hybray_link::HOST;
+use hybray_scheduler::policy::Tiles;
 use hybray_scheduler::{Options, Outcome};
 use hybray_wire::Counts;
 use net::{Lie, Manner};
@@ -52,12 +53,16 @@ fn any_plan(rng: &mut Rng, picture: &'static Picture) -> Plan<'static> {
     let delay_max = rng.pick(&[0, 1_000, 100_000, 10_000_000, 200_000_000]);
     let spread = rng.pick(&[None, None, Some(1.0), Some(2.0), Some(2.5), Some(8.0), Some(f32::INFINITY)]);
     let atomic = rng.pick(&[None, None, Some(1), Some(3), Some(4), Some(16), Some(u32::MAX)]);
+    let count = Tiles::PixelCount { pixels: rng.pick(&[0, 64, 200, 1_000, u32::MAX]) };
+    let tiles = rng.pick(&[Tiles::Dynamic, Tiles::Dynamic, Tiles::Static, count]);
+    let some = rng.below(3) == 0;
     Plan {
         seed: rng.next(),
         frame: picture.frame,
         scene: picture.scene,
         dispatcher: if rng.below(2) == 0 { HOST } else { 1 },
-        options: Options { spread, atomic },
+        options: Options { spread, atomic, tiles, take_over: rng.below(3) > 0 },
+        barred: (0..=nodes).map(|_| some && rng.below(2) == 0).collect(),
         manner: Manner {
             room: rng.pick(&[1, 1, 2, 3, 16, 64]),
             delay_max,
@@ -112,6 +117,15 @@ fn every_farm_draws_the_same_picture() {
         }
         if report.epochs.iter().any(|&epoch| epoch != 0) {
             return Err("a tile was traced twice".into());
+        }
+        let has_open = plan.barred[1..].contains(&false);
+        for (node, barred) in report.nodes.iter().zip(&plan.barred[1..]) {
+            if has_open && *barred && node.runs > 0 {
+                return Err("a node that is barred was given tiles".into());
+            }
+            if plan.options.tiles == Tiles::Static && node.runs > 1 {
+                return Err(format!("static, and {} runs", node.runs));
+            }
         }
         let reported: u32 = report.nodes.iter().map(|node| node.tiles).sum();
         if reported == picture.map.len() {

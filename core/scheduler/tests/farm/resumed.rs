@@ -16,11 +16,13 @@ fn kept(picture: &Picture, report: &Report) -> Vec<(u32, Vec<u8>)> {
     finished.map(|tile| (tile, bytes(tile))).collect()
 }
 
-/// Notes each tile that is given out.
+/// Notes each tile that is given out, unless it comes back to be given to another.
 fn note<'n>(given: &'n mut Vec<u32>) -> impl FnMut(Peer, Peer, &Message) -> Lie + 'n {
     |_, _, message| {
-        if let Message::Tiles { first, count, .. } = *message {
-            given.extend(first..first + count);
+        match *message {
+            Message::Tiles { first, count, .. } => given.extend(first..first + count),
+            Message::Back { first, count, .. } => given.retain(|tile| !(first..first + count).contains(tile)),
+            _ => {}
         }
         Lie::No
     }

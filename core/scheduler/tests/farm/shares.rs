@@ -37,6 +37,7 @@ fn farm_at(dispatcher: Peer, costs: &[u64], speeds: &[u64], options: Options, ma
             scene: void(),
             dispatcher,
             options,
+            barred: Vec::new(),
             manner,
             costs,
             speeds: speeds.to_vec(),
@@ -92,7 +93,7 @@ fn show(name: &str, costs: &[u64], speeds: &[u64], report: &Report) -> f64 {
 }
 
 fn spread(t: Option<f32>) -> Options {
-    Options { spread: t, atomic: None }
+    Options { spread: t, atomic: None, ..Options::default() }
 }
 
 #[test]

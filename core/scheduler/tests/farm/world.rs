@@ -6,6 +6,7 @@ use crate::toy::SCENE_HASH;
 use hybray_arena::{Arena, LINE_BYTES};
 use hybray_geometry::simd::Kernels;
 use hybray_link::{Event, HOST, Link, Peer};
+use hybray_scheduler::policy::Tiles;
 use hybray_scheduler::{
     All, Dispatcher, Film, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options, Outcome, Settings,
     TileState,
@@ -30,6 +31,8 @@ pub struct Plan<'a> {
     pub scene: Scene<'a>,
     pub dispatcher: Peer,
     pub options: Options,
+    /// Nodes that are given no tiles: entry 0 is the host's.
+    pub barred: Vec<bool>,
     pub manner: Manner,
     /// What each tile costs.
     pub costs: &'a [u64],
@@ -136,7 +139,8 @@ impl Worker<'_, '_> {
                         spent.push_back(0);
                         *held += 1;
                         *gaps += idle_since.take().map_or(0, |since| now - since);
-                        assert!(*held <= 2, "node {me} has {held} runs");
+                        let most = if matches!(plan.options.tiles, Tiles::PixelCount { .. }) { 8 } else { 2 };
+                        assert!(*held <= most, "node {me} has {held} runs");
                     }
                     if view.message == Message::Stop {
                         // It drops what it has, and only says what it did.
@@ -309,7 +313,8 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     let mut master = Master::new(plan.frame, film, &mut reports, SCENE_HASH, plan.dispatcher);
     let mut states = vec![NodeState::default(); peers];
     let mut bits = vec![0; if plan.forgetful { 0 } else { map.len().div_ceil(64) as usize }];
-    let dispatcher = Dispatcher::new(&mut states, plan.options).biased(plan.biased).keeping(&mut bits);
+    let dispatcher =
+        Dispatcher::new(&mut states, plan.options).biased(plan.biased).barring(&plan.barred).keeping(&mut bits);
     let (mut host_dispatcher, mut node_dispatcher) = match plan.dispatcher {
         HOST => (Some(dispatcher), None),
         _ => (None, Some(dispatcher.on(plan.dispatcher))),
@@ -352,9 +357,12 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
     // All work on the slowest node four times over, every message on its own, and some sleep for each: far beyond any
     // schedule that is not stuck.
     let held_up = plan.manner.held_up.map_or(0, |(_, time)| time);
+    // Where pixels are counted, a node is silent for ten seconds before what is lost is given up.
+    let silence = if matches!(plan.options.tiles, Tiles::PixelCount { .. }) { 11_000_000_000 } else { 0 };
     let bound = 4 * slowest * plan.costs.iter().sum::<u64>()
         + 8 * messages * (2 * plan.manner.delay_max + held_up + WAIT + TURN)
-        + 100 * plan.manner.delay_max;
+        + 100 * plan.manner.delay_max
+        + u64::from(map.len()) * silence;
     let (mut deaths, mut injected) = (plan.deaths.clone(), plan.injected.clone());
     let mut finished_at = None;
     let mut ended = None;
