@@ -47,7 +47,7 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
                 let options = Options { tiles, take_over: random.below(2) == 0, ..Options::default() };
                 let barred: Vec<bool> = (0..=nodes).map(|_| random.below(3) == 0).collect();
                 let plan = planned(&scene, &owners, nodes, memory, policy).expect("it is enough");
-                let room = plan.light_cache_room(memory);
+                let room = plan.room_for_copies(memory);
                 let asked = [None, Some(0), Some(room / 2), Some(room)][random.below(4)];
                 let (plan, caches) = light_caches(plan, memory, asked, policy, &scene, &owners, nodes).expect("room");
                 assert!(plan.sum().total_bytes() <= memory, "{plan:?}");
@@ -164,16 +164,16 @@ fn a_refusal_says_what_would_do() {
         match plan(nodes, memory) {
             Ok(plan) => {
                 assert!(plan.sum().total_bytes() <= memory, "{what}: {plan:?}");
-                let room = plan.light_cache_room(memory);
-                let all = plan.with_light_cache(room, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
+                let room = plan.room_for_copies(memory);
+                let all = plan.with_copies(room, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
                 assert!(all.sum().total_bytes() <= memory, "{what}: {all:?}");
-                let more = plan.with_light_cache(room + LINE, memory);
+                let more = plan.with_copies(room + LINE, memory);
                 let refused = Err(PlanError::LightCache { bytes: room + LINE, room });
                 assert!(more == refused || plan.holds_all && more == Ok(plan), "{what}: {more:?}");
                 let some = LINE * (random.bits() % (room / LINE + 1));
-                let some = plan.with_light_cache(some, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
+                let some = plan.with_copies(some, memory).unwrap_or_else(|e| panic!("{what}: {e}"));
                 assert!(some.sum().total_bytes() <= memory && some.places <= plan.places, "{what}: {some:?}");
-                assert!(plan.holds_all || some.fixed_bytes() == plan.fixed_bytes() + 64 * some.light_lines as u64);
+                assert!(plan.holds_all || some.fixed_bytes() == plan.fixed_bytes() + 64 * some.copied_lines as u64);
             }
             Err(error) => {
                 let needed = needed(Err(error)).expect("a refusal");

@@ -207,7 +207,7 @@ impl Draw {
         let least = least(scene, &owners, nodes, policy);
         let memory = least + least * one_of(random, &[0, 0, 0, 1, 4, 16]) / 16;
         let plan = planned(scene, &owners, nodes, memory, policy).expect("it is enough");
-        let room = plan.light_cache_room(memory);
+        let room = plan.room_for_copies(memory);
         let asked = one_of(random, &[None, Some(0), Some(room / 2), Some(room)]);
         let (plan, caches) = light_caches(plan, memory, asked, policy, scene, &owners, nodes).expect("there is room");
         let mut copies = caches.pages;
@@ -216,7 +216,7 @@ impl Draw {
             copies.resize(usize::from(nodes), Vec::new());
             let entries = scene.resident.directory.entries;
             for (node, copies) in (1..).zip(&mut copies) {
-                let mut room = plan.light_cache_room(memory);
+                let mut room = plan.room_for_copies(memory);
                 for _ in 0..random.below(20) {
                     let page = random.below(count);
                     let bytes = 64 * lines_for(entries[page].bytes as usize) as u64;

@@ -29,7 +29,7 @@ pub use node::{
     REQUESTS_MAX, Settings, Store, Traffic, can_draw,
 };
 
-pub use plan::{Plan, PlanError, Sizes, light_cache_bytes};
+pub use plan::{Plan, PlanError, Sizes, bytes_of_copies};
 pub use server::{Asked, FETCHES, PART_BYTES, PageServer};
 
 use hybray_link::{Link, Peer};

@@ -82,11 +82,11 @@ fn even_share(sizes: &Sizes, nodes: u16) -> u64 {
     (sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64).min(sizes.pages_bytes)
 }
 
-/// What the largest of these light caches takes, bytes in whole lines: each is a list of pages.
+/// What the node takes for its copies that has most, bytes in whole lines: each node's are a list of pages.
 #[must_use]
-pub fn light_cache_bytes(entries: &[PageEntry], caches: &[impl AsRef<[u32]>]) -> u64 {
+pub fn bytes_of_copies(entries: &[PageEntry], copies: &[impl AsRef<[u32]>]) -> u64 {
     let bytes = |&page: &u32| (lines_for(entries[page as usize].bytes as usize) * size_of::<Line>()) as u64;
-    caches.iter().map(|pages| pages.as_ref().iter().map(bytes).sum()).max().unwrap_or(0)
+    copies.iter().map(|pages| pages.as_ref().iter().map(bytes).sum()).max().unwrap_or(0)
 }
 
 /// What a node is made of.
@@ -100,8 +100,9 @@ pub struct Plan {
     pub places: usize,
     /// Lines for pages: the cache's first, then those of pages that stay.
     pub lines: usize,
-    /// How many of them are for pages between the node's own and the lights, which stay, too.
-    pub light_lines: usize,
+    /// How many of them are for copies of others' pages, given in advance, which stay, too: light caches, and what a pilot
+    /// found to be used.
+    pub copied_lines: usize,
     /// Whether the node has room for every page.
     pub holds_all: bool,
 }
@@ -165,7 +166,7 @@ impl Plan {
             partials: share(PARTIALS, 44),
         };
         let lines = PLACES_MIN * lines_for(sizes.page_bytes_max);
-        Self { sizes, limits, places: PLACES_MIN, lines, light_lines: 0, holds_all: false }
+        Self { sizes, limits, places: PLACES_MIN, lines, copied_lines: 0, holds_all: false }
     }
 
     fn least_bytes(&self) -> u64 {
@@ -185,10 +186,10 @@ impl Plan {
         self
     }
 
-    /// Bytes that a light cache could have of a budget of `memory`, if the cache had no more than it must. 0 where every page
+    /// Bytes that copies could have of a budget of `memory`, if the cache had no more than it must. 0 where every page
     /// is at hand.
     #[must_use]
-    pub fn light_cache_room(&self, memory: u64) -> u64 {
+    pub fn room_for_copies(&self, memory: u64) -> u64 {
         if self.holds_all {
             return 0;
         }
@@ -196,20 +197,20 @@ impl Plan {
         memory.saturating_sub(self.with_places(PLACES_MIN).sum().total_bytes()) / line * line
     }
 
-    /// The same with `bytes`, in whole lines, for pages between the node's own and the lights: its cache gets the smaller.
+    /// The same with `bytes`, in whole lines, for copies of others' pages: its cache gets the smaller.
     ///
     /// # Errors
     /// If a budget of `memory` has no room for it. Where every page is at hand it takes nothing, and none is wanted.
-    pub fn with_light_cache(self, bytes: u64, memory: u64) -> Result<Self, PlanError> {
+    pub fn with_copies(self, bytes: u64, memory: u64) -> Result<Self, PlanError> {
         if bytes == 0 || self.holds_all {
             return Ok(self);
         }
-        let room = self.light_cache_room(memory);
+        let room = self.room_for_copies(memory);
         let Some(rest) = room.checked_sub(bytes) else { return Err(PlanError::LightCache { bytes, room }) };
         let places = PLACES_MIN + (rest / self.place_bytes()) as usize;
         let mut plan = self.with_places(places.min(self.places));
-        plan.light_lines = bytes as usize / size_of::<Line>();
-        plan.lines += plan.light_lines;
+        plan.copied_lines = bytes as usize / size_of::<Line>();
+        plan.lines += plan.copied_lines;
         Ok(plan)
     }
 
@@ -234,7 +235,7 @@ impl Plan {
     pub fn without_budget(sizes: Sizes) -> Self {
         let limits = Limits { pages: 0, ..Limits::all_at_hand() };
         let lines = sizes.pages_bytes as usize / size_of::<Line>();
-        Self { sizes, limits, places: 0, lines, light_lines: 0, holds_all: true }
+        Self { sizes, limits, places: 0, lines, copied_lines: 0, holds_all: true }
     }
 
     /// Bytes of pages, rounded up to lines, that a node may own or be given for good.
@@ -263,8 +264,8 @@ impl Plan {
         sum.add::<Material>("materials", s.materials);
         sum.add::<Light>("lights", s.lights);
         sum.add::<CachePlace>("places of the cache", self.places);
-        sum.add::<Line>("pages", self.lines - self.light_lines);
-        sum.add::<Line>("pages towards lights", self.light_lines);
+        sum.add::<Line>("pages", self.lines - self.copied_lines);
+        sum.add::<Line>("copies of pages", self.copied_lines);
         sum
     }
 
@@ -332,7 +333,7 @@ impl Plan {
     /// Settings that go with this plan.
     #[must_use]
     pub fn settings(&self, settings: Settings) -> Settings {
-        let lights_first = settings.lights_first || self.light_lines > 0;
+        let lights_first = settings.lights_first || self.copied_lines > 0;
         Settings { in_system: settings.in_system.min(self.limits.rays as u32 / 2), lights_first, ..settings }
     }
 }

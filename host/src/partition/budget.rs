@@ -8,7 +8,7 @@ use super::owners::owned_bytes;
 use super::{LightCaches, Misfit, Pilot, PlacedPage, copies, light_caches, owners, owners_by_use};
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{Plan, PlanError, Sizes, light_cache_bytes};
+use hybray_scheduler::{Plan, PlanError, Sizes, bytes_of_copies};
 use hybray_tracer::Scene;
 
 /// Places that a node's page memory has at least, if [`page_bytes_for`] can see to it.
@@ -158,12 +158,11 @@ impl Wanted {
         let memory = self.page_memory.map_or(self.memory, |_| base.sum().total_bytes());
         fit = fit.with_light_caches(self, light_cache, scene)?;
         if !fit.plan.holds_all {
-            let most = fit.plan.light_cache_room(memory) / COPIES.1 * COPIES.0;
+            let most = fit.plan.room_for_copies(memory) / COPIES.1 * COPIES.0;
             let copies = copies(pages, &parts, &fit.owners, &fit.copies, most);
             fit.copies.resize(usize::from(self.nodes), Vec::new());
             fit.copies.iter_mut().zip(copies).for_each(|(all, more)| all.extend(more));
-            fit.plan =
-                base.with_light_cache(light_cache_bytes(scene.resident.directory.entries, &fit.copies), memory)?;
+            fit.plan = base.with_copies(bytes_of_copies(scene.resident.directory.entries, &fit.copies), memory)?;
         }
         Ok(Fit { parts: parts.bounds, ..fit })
     }

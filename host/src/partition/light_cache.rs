@@ -8,7 +8,7 @@
 use hybray_geometry::{Aabb, Vec3};
 use hybray_scene::{Child, Directory, Line, lines_for};
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{Plan, PlanError, light_cache_bytes};
+use hybray_scheduler::{Plan, PlanError, bytes_of_copies};
 use hybray_shading::{Light, LightKind};
 use hybray_tracer::Scene;
 
@@ -44,11 +44,11 @@ pub fn light_caches(
         return Ok((plan, LightCaches::default()));
     }
     let pages = towards_lights(&scene.resident.directory, scene.shading.lights, owners, nodes, most);
-    let taken = light_cache_bytes(scene.resident.directory.entries, &pages);
-    if bytes.is_none() && taken > plan.light_cache_room(memory) / 2 {
+    let taken = bytes_of_copies(scene.resident.directory.entries, &pages);
+    if bytes.is_none() && taken > plan.room_for_copies(memory) / 2 {
         return Ok((plan, LightCaches::default()));
     }
-    Ok((plan.with_light_cache(taken, memory)?, LightCaches { pages, bytes: taken }))
+    Ok((plan.with_copies(taken, memory)?, LightCaches { pages, bytes: taken }))
 }
 
 /// For each node, the pages of others between the box of those that it owns and the lights, `most` bytes of them: one for

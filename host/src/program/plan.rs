@@ -192,12 +192,18 @@ fn table(report: &Report<'_>, fit: &Fit, farm: &Farm<'_>, least: Least) -> Strin
         format!("has a cache of {places} place{} for others", s(places as u64))
     };
     line(format_args!("each node  owns {least_owned} to {most_owned} bytes of pages, and {holds}"));
+    let (least_copies, most_copies) = (report.plan.copies_least, report.plan.copies_most);
+    if most_copies > 0 {
+        let s = s(most_copies as u64);
+        line(format_args!(
+            "           and copies of {least_copies} to {most_copies} page{s} of others from the beginning"
+        ));
+    }
     let light_caches = &report.plan.light_caches;
     if light_caches.bytes > 0 {
         let lights = light_caches.lights;
         let (least, most) = (light_caches.pages_least, light_caches.pages_most);
-        let s = [s(most as u64), s(lights as u64)];
-        line(format_args!("           and {least} to {most} page{} of others towards {lights} light{}", s[0], s[1]));
+        line(format_args!("           of which {least} to {most} lie towards {lights} light{}", s(lights as u64)));
     }
     let [memory, nodes] = farm.arguments(least);
     let unless = |text: Option<String>| text.unwrap_or_else(|| "nothing".to_owned());

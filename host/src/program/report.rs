@@ -131,6 +131,11 @@ pub(super) struct PlanReport {
     pub owned_bytes_least: u64,
     /// Of the one that owns most.
     pub owned_bytes_most: u64,
+    /// Pages of others that the node has from the beginning which has fewest of them, those of light caches included; 0 where
+    /// every node has all pages.
+    pub copies_least: usize,
+    /// That the one has which has most.
+    pub copies_most: usize,
     pub light_caches: LightCachesReport,
 }
 
@@ -182,6 +187,8 @@ impl PlanReport {
             holds_all: fit.plan.holds_all,
             owned_bytes_least: fit.owned_bytes.iter().min().copied().unwrap_or(0),
             owned_bytes_most: fit.owned_bytes.iter().max().copied().unwrap_or(0),
+            copies_least: fit.copies.iter().map(Vec::len).min().unwrap_or(0),
+            copies_most: fit.copies.iter().map(Vec::len).max().unwrap_or(0),
             light_caches,
         }
     }

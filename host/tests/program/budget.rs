@@ -293,19 +293,27 @@ fn light_caches_are_planned() {
     let plan = |more: &str| json(&folder, &format!("plan spd:balls:4 --nodes 8 --memory 256KiB {more}"));
     let term = |r: &Value| {
         let terms = r["terms"].as_array().unwrap();
-        let found = terms.iter().find(|term| term["name"] == "pages towards lights").unwrap_or_else(|| panic!("{r}"));
+        let found = terms.iter().find(|term| term["name"] == "copies of pages").unwrap_or_else(|| panic!("{r}"));
         (whole(found, "/bytes"), whole(r, "/light_caches/pages_most"), whole(r, "/light_caches/lights"))
     };
-    let without = plan("");
-    for none in [&without, &plan("--light-cache 0"), &plan("--light-cache 0 --scheduler hybrid-1995")] {
-        assert_eq!(term(none), (0, 0, 0));
+    let without = plan("--scheduler demand-driven");
+    for none in [&without, &plan("--light-cache 0 --scheduler hybrid-1995")] {
+        assert_eq!((term(none), whole(none, "/copies_most")), ((0, 0, 0), 0));
     }
-    let some = plan("--light-cache 20000");
+    let some = plan("--light-cache 20000 --scheduler demand-driven");
     let (bytes, pages, lights) = term(&some);
     assert!((10_000..=20_000).contains(&bytes) && pages > 1 && lights == 3, "{bytes}, {pages}, {lights}");
     assert_eq!(whole(&some, "/light_caches/bytes"), bytes);
     assert!(whole(&some, "/cache_places") < whole(&without, "/cache_places"));
     assert!(whole(&some, "/total_bytes") <= 256 * 1024);
+    assert_eq!(whole(&some, "/copies_most"), pages);
+    // What a pilot found comes beside them.
+    let (piloted, both) = (plan(""), plan("--light-cache 20000"));
+    assert_eq!((term(&piloted).1, term(&piloted).2, term(&both).2), (0, 0, 3));
+    assert!(term(&piloted).0 > 0 && whole(&piloted, "/copies_least") > 0 && term(&both).0 > bytes);
+    for r in [&piloted, &both] {
+        assert!(whole(r, "/total_bytes") <= 256 * 1024 && whole(r, "/cache_places") > 2, "{r}");
+    }
     // By default all that there are, or none.
     assert_eq!(term(&plan("--scheduler hybrid-1995")), (0, 0, 0));
     let roomy = json(&folder, "plan spd:balls:4 --nodes 8 --memory 1MiB --scheduler hybrid-1995");
@@ -313,9 +321,11 @@ fn light_caches_are_planned() {
     assert!(bytes > 100_000, "{bytes}");
     let all = json(&folder, "plan spd:balls:4 --nodes 8 --memory 1MiB --scheduler hybrid-1995 --light-cache 512KiB");
     assert_eq!(term(&all), term(&roomy));
-    let (_, table) = folder.succeed("plan spd:balls:4 --nodes 8 --memory 256KiB --light-cache 20000");
+    let table = "plan spd:balls:4 --nodes 8 --memory 256KiB --light-cache 20000 --scheduler demand-driven";
+    let (_, table) = folder.succeed(table);
     let table = String::from_utf8(table).unwrap();
-    assert!(table.contains(&format!(" to {pages} pages of others towards 3 lights")), "{table}");
+    assert!(table.contains(&format!(" to {pages} pages of others from the beginning")), "{table}");
+    assert!(table.contains(&format!(" to {pages} lie towards 3 lights")), "{table}");
     // Every page fits.
     assert_eq!(term(&json(&folder, "plan spd:balls:4 --nodes 8 --memory 2MiB --light-cache 1MiB")), (0, 0, 0));
 

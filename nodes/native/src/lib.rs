@@ -11,8 +11,8 @@ use hybray_scene::{Line, lines_for};
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{
     All, Asked, Clipper, Dispatcher, Film, HighWater, Limits, Master, Node, NodeMemory, NodeReport, NodeState, Options,
-    Outcome, PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, Unclipped, can_draw,
-    light_cache_bytes,
+    Outcome, PageServer, Plan, PlanError, Progress, Settings, Sizes, Store, TileState, Traffic, Unclipped,
+    bytes_of_copies, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -126,8 +126,8 @@ pub fn trace_within(
     let mut scene = *scene;
     scene.resident.directory.entries = &entries;
     let plan = plan(&scene, farm.nodes, budget.memory, budget.settings.policy)?;
-    let light_bytes = light_cache_bytes(scene.resident.directory.entries, budget.copies);
-    let plan = plan.with_light_cache(light_bytes, budget.memory)?;
+    let light_bytes = bytes_of_copies(scene.resident.directory.entries, budget.copies);
+    let plan = plan.with_copies(light_bytes, budget.memory)?;
     let bytes = plan.sum().total_bytes();
     // Where there are no subhosts the host clips.
     let clips = (budget.settings.subhosts == Some(0)).then_some(&scene);

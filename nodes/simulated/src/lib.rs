@@ -27,7 +27,7 @@ use hybray_link::Peer;
 use hybray_scene::{Line, lines_for, parents};
 use hybray_scheduler::{
     Asked, Clipper, Film, HighWater, Master, NodeReport, NodeState, Options, Outcome, PageServer, Plan, PlanError,
-    Progress, Settings, Sizes, TileState, Unclipped, can_draw, light_cache_bytes,
+    Progress, Settings, Sizes, TileState, Unclipped, bytes_of_copies, can_draw,
 };
 use hybray_tracer::Scene;
 use hybray_wire::{Frame, TileMap};
@@ -228,7 +228,7 @@ pub fn simulate_spoiled(
             plan = plan.with_page_memory(bytes, farm.nodes, owned_max);
         }
         let memory = budget.page_memory.map_or(budget.memory, |_| plan.sum().total_bytes());
-        plan = plan.with_light_cache(light_cache_bytes(&entries, budget.copies), memory)?;
+        plan = plan.with_copies(bytes_of_copies(&entries, budget.copies), memory)?;
     }
     scene.resident.directory.entries = &entries;
     let mut up = vec![0; scene.resident.directory.nodes.len() + entries.len()];
