@@ -213,8 +213,8 @@ pub struct Worked {
     pub high_water: HighWater,
 }
 
-/// Runs the machines; the host gives out pages whose owners are lost, and clips the scene of `clips`. `node` makes and turns each node, on a thread of its
-/// own.
+/// Runs the machines; the host gives out pages of the `budget` whose owners are lost, and clips the scene of `clips`. `node`
+/// makes and turns each node, on a thread of its own.
 fn run(
     frame: &Frame,
     scene_hash: u64,
