@@ -30,7 +30,7 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
     let expected =
         trace(&scene, prepared.hash, &frame, &farm(1, DispatcherAt::Host), &mut |_| true).expect("a picture");
     let seed = name.bytes().fold(page_bytes as u64, |seed, byte| seed.wrapping_mul(31) + u64::from(byte));
-    let random = &mut Random(seed);
+    let (random, ways) = (&mut Random(seed), &mut Random(!seed));
     let mut light_pages = 0;
     for nodes in [1, 2, 3, 7] {
         let owners: Vec<u16> = pages.iter().map(|_| random.below(nodes) as u16 + 1).collect();
@@ -40,12 +40,12 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
             for memory in [least, least + least / 2] {
                 let dispatcher = [DispatcherAt::Host, DispatcherAt::Node][random.below(2)];
                 let steps = [16, 4096][random.below(2)];
-                let subhosts = [None, Some(0), Some(1), Some(nodes / 2)][random.below(4)];
+                let subhosts = [None, Some(0), Some(1), Some(nodes / 2)][ways.below(4)];
                 let settings = Settings { policy, steps, subhosts, ..Settings::default() };
                 let count = Tiles::PixelCount { pixels: 300 };
-                let tiles = [Tiles::Dynamic, Tiles::Static, count][random.below(3)];
-                let options = Options { tiles, take_over: random.below(2) == 0, ..Options::default() };
-                let barred: Vec<bool> = (0..=nodes).map(|_| random.below(3) == 0).collect();
+                let tiles = [Tiles::Dynamic, Tiles::Static, count][ways.below(3)];
+                let options = Options { tiles, take_over: ways.below(2) == 0, ..Options::default() };
+                let barred: Vec<bool> = (0..=nodes).map(|_| ways.below(3) == 0).collect();
                 let plan = planned(&scene, &owners, nodes, memory, policy).expect("it is enough");
                 let room = plan.room_for_copies(memory);
                 let asked = [None, Some(0), Some(room / 2), Some(room)][random.below(4)];
