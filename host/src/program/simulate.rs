@@ -50,6 +50,11 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let scene = prepared.scene(&pages);
     let pages_bytes = Sizes::of(&scene).pages_bytes;
     let page_memory = args.page_memory.map(|page_memory| page_memory.bytes(pages_bytes));
+    let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
+    experiment.dispatcher = match args.dispatcher {
+        Where::Host => HOST,
+        Where::Node => 1,
+    };
     // One node alone has the whole scene.
     let criterion = args.work.demand_driven;
     let mut voxels = Voxels::One;
@@ -62,8 +67,8 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
             page_memory,
             policy,
             light_cache: args.light.light_cache,
-            pilot: None,
-            first_dispatches: false,
+            pilot: experiment.pilot(policy).filter(|_| nodes > 1),
+            first_dispatches: experiment.dispatcher != HOST,
             nodes_most: NODES_MAX,
             tree: &args.tree,
             packed,
@@ -74,11 +79,6 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
         voxels = farm.voxels();
     }
 
-    let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
-    experiment.dispatcher = match args.dispatcher {
-        Where::Host => HOST,
-        Where::Node => 1,
-    };
     (experiment.criterion, experiment.voxels) = (criterion.unwrap_or_default(), voxels);
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };

@@ -93,10 +93,16 @@ impl<'a> Experiment<'a> {
         let packed = &self.prepared.packed;
         let first_dispatches = self.dispatcher != HOST;
         let wanted = Wanted { sizes, nodes, memory, page_memory, policy, first_dispatches };
-        let trace = || Pilot::of_policy(Policy::Hybrid, self.scene, self.frame);
-        let pilot = if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None };
+        let pilot = self.pilot(policy);
         let (pages, voxels) = (packed.placed_pages(), packed.voxels());
         wanted.fit_picture(&pages, voxels, self.scene, self.light_cache, pilot).map(Some)
+    }
+
+    /// What went ahead of the picture, where `policy` has a pilot.
+    #[must_use]
+    pub fn pilot(&self, policy: Policy) -> Option<&Pilot> {
+        let trace = || Pilot::of_policy(Policy::Hybrid, self.scene, self.frame);
+        if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None }
     }
 
     /// Which of so many nodes are given no tiles: entry 0 is the host's.
