@@ -35,6 +35,10 @@ const SPREAD_RANGE: (f32, f32) = (2.5, 16.0);
 const SLOW: f32 = 0.5;
 /// Nodes that one node shares with at a time: each takes half of what is left, and each word costs it time.
 const HELPERS: u32 = 2;
+/// What a word and its answer are taken to need before it is known, nanoseconds.
+const WORD: u64 = 100_000;
+/// Who had nothing to share is asked again after the time of two words, then four, up to 2 to this power.
+const DRY_MAX: u32 = 10;
 /// A run should take this many times as long as its messages.
 const OVERHEAD_FACTOR: u64 = 2;
 
@@ -105,8 +109,9 @@ pub struct NodeState {
     asked: u32,
     /// Nodes that it was told to share with, and that are not through with it.
     helpers: u32,
-    /// It had nothing to share, and has not ended a run since.
-    dry: bool,
+    /// How often it had nothing to share, since it last had something or ended a run; and when it may be asked again.
+    dry: u32,
+    dry_until: u64,
     tiles_done: u64,
     nanoseconds: u64,
     /// When its first run was sent, to learn what a message costs.
@@ -283,10 +288,13 @@ impl<'m> Dispatcher<'m> {
             Message::Again { tile, epoch } if from == HOST => self.again(tile, epoch),
             Message::Back { with, first, count } => self.back(from, with, first, count),
             Message::Idle { given } => {
+                let word = if self.overhead == u64::MAX { WORD } else { self.overhead };
                 let helped = self.nodes.get_mut(usize::from(from)).and_then(|node| node.helping.take());
                 if let Some(helped) = helped.and_then(|helped| self.nodes.get_mut(usize::from(helped))) {
                     helped.helpers = helped.helpers.saturating_sub(1);
-                    helped.dry |= !given;
+                    // Rays may still come to it from others, but who asks too often takes the time to trace them.
+                    helped.dry = if given { 0 } else { (helped.dry + 1).min(DRY_MAX) };
+                    helped.dry_until = if given { 0 } else { now.saturating_add(word.saturating_mul(1 << helped.dry)) };
                 }
             }
             _ => {}
@@ -411,7 +419,7 @@ impl<'m> Dispatcher<'m> {
         }
         node.runs.pop_front();
         node.tiles_done += u64::from(count);
-        (node.since, node.asked, node.dry) = (now, 0, false);
+        (node.since, node.asked, node.dry, node.dry_until) = (now, 0, 0, 0);
         node.nanoseconds = node.nanoseconds.saturating_add(nanoseconds);
         if !node.measured {
             node.measured = true;
@@ -660,7 +668,7 @@ impl<'m> Dispatcher<'m> {
     }
 
     /// At the end of a picture, those who have nothing to do are given rays by those who have. Bounded: all nodes, once.
-    fn share(&mut self, link: &mut dyn Link) {
+    fn share(&mut self, link: &mut dyn Link, now: u64) {
         let count = self.nodes.len();
         for idle in 1..count {
             let node = &self.nodes[idle];
@@ -676,7 +684,7 @@ impl<'m> Dispatcher<'m> {
             };
             let may_be = |peer: &usize| {
                 let node = &self.nodes[*peer];
-                *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS && !node.dry
+                *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS && node.dry_until <= now
             };
             let Some(peer) = (1..count).filter(may_be).min_by_key(key) else { return };
             if send(link, peer as Peer, &Message::Share { with: idle as Peer }) {
@@ -762,7 +770,7 @@ impl<'m> Dispatcher<'m> {
         let told = !self.is_idle() || self.nodes.iter().all(|node| !node.here || node.told);
         let takes_over = self.options.take_over && self.options.tiles != Tiles::Static;
         if takes_over && told && self.left() == 0 && self.again.is_empty() && !self.gathering {
-            self.share(link);
+            self.share(link, now);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! divided, and which pages they open says where pages are best kept. No picture depends on it, only the time that it takes.
 
 use bytemuck::Zeroable;
-use hybray_bintree::walk::{FROM_ROOT, Stack};
+use hybray_bintree::walk::{self, FROM_ROOT, Stack};
 use hybray_geometry::Candidate;
 use hybray_geometry::simd::Kernels;
 use hybray_scene::{PageView, Pages};
@@ -38,8 +38,10 @@ pub struct Pilot {
     /// Tiles that one look stands for.
     step: u32,
     looks: Vec<Look>,
-    /// Rays of all kinds that were traced for it.
-    pub rays: u64,
+    /// What walks did for it.
+    pub walks: walk::Counts,
+    /// Rays and hits.
+    pub counts: Counts,
 }
 
 /// A division of the picture among nodes.
@@ -133,7 +135,7 @@ impl Pilot {
             }
             looks.push(Look { cost: cost(&walker, &counts) - before, pages: watched.opened.take() });
         }
-        Some(Self { tiles, step, looks, rays: counts.primary + counts.secondary + counts.shadow })
+        Some(Self { tiles, step, looks, walks: walker.counts, counts })
     }
 
     /// Divides the picture among `nodes` into pieces that follow each other and cost as much; the first node's is `first`
@@ -186,7 +188,7 @@ mod tests {
                     pages: (0..random.below(4)).map(|_| random.below(9) as u32).collect(),
                 })
                 .collect();
-            let pilot = Pilot { tiles, step, looks, rays: 0 };
+            let pilot = Pilot { tiles, step, looks, ..Pilot::default() };
             let first = if seed % 2 == 0 { 1.0 } else { random.below(100) as f64 / 100.0 };
             let Parts { bounds, uses } = pilot.parts(nodes, first);
             assert_eq!((bounds.len(), bounds[0], bounds[usize::from(nodes)]), (usize::from(nodes) + 1, 0, tiles));

@@ -9,7 +9,7 @@ use crate::prepare::Prepared;
 use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::{Criterion, Policy};
 use hybray_scheduler::{Options, Outcome, Progress, Settings, Sizes};
-use hybray_simulated::{Budget, Farm, Machine, SimulateError, Simulated, simulate};
+use hybray_simulated::{Budget, Farm, Machine, Operations, SimulateError, Simulated, simulate};
 use hybray_tracer::Scene;
 use hybray_wire::{Counts, Frame};
 use std::cell::OnceCell;
@@ -36,6 +36,8 @@ pub struct Experiment<'a> {
     pub page_memory: Option<u64>,
     /// What of that is for light caches, bytes; as the policy has it if it is not given.
     pub light_cache: Option<u64>,
+    /// Whether a pilot goes ahead where the policy has one.
+    pub has_pilot: bool,
     /// What rays of the picture found that were ahead of it, when that was asked for.
     pilot: OnceCell<Option<Pilot>>,
     /// Which nodes are given tiles, where they have memory; one alone always is.
@@ -74,6 +76,7 @@ impl<'a> Experiment<'a> {
             memory: None,
             page_memory: None,
             light_cache: None,
+            has_pilot: true,
             pilot: OnceCell::new(),
             criterion: Criterion::All,
             voxels: Voxels::One,
@@ -93,7 +96,7 @@ impl<'a> Experiment<'a> {
         let packed = &self.prepared.packed;
         let first_dispatches = self.dispatcher != HOST;
         let wanted = Wanted { sizes, nodes, memory, page_memory, policy, first_dispatches };
-        let pilot = self.pilot(policy);
+        let pilot = self.pilot(policy).filter(|_| self.has_pilot);
         let (pages, voxels) = (packed.placed_pages(), packed.voxels());
         wanted.fit_picture(&pages, voxels, self.scene, self.light_cache, pilot).map(Some)
     }
@@ -103,6 +106,23 @@ impl<'a> Experiment<'a> {
     pub fn pilot(&self, policy: Policy) -> Option<&Pilot> {
         let trace = || Pilot::of_policy(Policy::Hybrid, self.scene, self.frame);
         if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None }
+    }
+
+    /// What one of the machine's nodes would have taken for the pilot, seconds: time before the first tile.
+    #[must_use]
+    pub fn pilot_seconds(&self) -> f64 {
+        let Some(Pilot { walks, counts, .. }) = self.pilot(self.settings.policy).filter(|_| self.has_pilot) else {
+            return 0.0;
+        };
+        let operations = Operations {
+            cells: walks.nodes,
+            blocks: walks.blocks,
+            pages: walks.pages,
+            hits: counts.hits,
+            rays: rays(counts),
+            ..Operations::default()
+        };
+        self.machine.costs.of(&operations) as f64 * 1e-12
     }
 
     /// Which of so many nodes are given no tiles: entry 0 is the host's.

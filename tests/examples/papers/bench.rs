@@ -61,6 +61,8 @@ pub struct Job {
     pub subhosts: Option<u16>,
     /// Nodes that have nothing to do at the end are given rays of others.
     pub take_over: bool,
+    /// A pilot goes ahead, if the policy has one.
+    pub pilot: bool,
 }
 
 impl Job {
@@ -88,6 +90,7 @@ impl Job {
             criterion: Criterion::All,
             subhosts: None,
             take_over: true,
+            pilot: true,
         }
     }
 
@@ -105,7 +108,7 @@ impl Job {
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
         let same = Self { tiles: Tiles::Dynamic, criterion: Criterion::All, take_over: true, ..self.clone() };
-        let same = Self { subhosts: None, ..same };
+        let same = Self { subhosts: None, pilot: true, ..same };
         Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..same }
     }
 }
@@ -119,6 +122,8 @@ pub struct Figures {
     pub busy: f64,
     /// Until pages are in place, virtual seconds.
     pub loading_seconds: f64,
+    /// What a node would have taken for the pilot, which is before that, virtual seconds.
+    pub pilot_seconds: f64,
     /// Until the film is at the host, virtual seconds.
     pub gathering_seconds: f64,
     /// Frames that nodes sent.
@@ -141,7 +146,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    fn of(run: &Simulated, with_tiles: usize) -> Self {
+    fn of(run: &Simulated, with_tiles: usize, pilot_seconds: f64) -> Self {
         let sum = |of: &dyn Fn(&NodeRun) -> u64| run.nodes.iter().map(of).sum::<u64>();
         let ray_messages = run.kinds.iter().find(|(kind, _)| *kind == "rays").map_or(0, |(_, (frames, _))| *frames);
         let fixed = run.plan.sum().total_bytes() - run.plan.lines as u64 * 64;
@@ -149,6 +154,7 @@ impl Figures {
             seconds: run.time_ns as f64 * 1e-9,
             busy: run.busy(),
             loading_seconds: run.loading_ns as f64 * 1e-9,
+            pilot_seconds,
             gathering_seconds: run.gathering_ns as f64 * 1e-9,
             messages: sum(&|node| node.traffic.sent_frames),
             bytes: sum(&|node| node.traffic.sent_bytes),
@@ -300,6 +306,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     let mut experiment = Experiment::new(prepared, &scene, &frame, machine);
     experiment.dispatcher = job.is_dispatched_by_node.into();
     let Job { atomic, tiles, take_over, criterion, .. } = *job;
+    experiment.has_pilot = job.pilot;
     experiment.options = Options { spread: job.spread.map(f32::from), atomic, tiles, take_over };
     (experiment.criterion, experiment.voxels) = (criterion, job.voxels.parse().map_err(failed)?);
     let settings = machine.settings(job.policy);
@@ -324,7 +331,11 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     let barred = fit.and_then(|fit| experiment.barred(&fit.owners, job.nodes).ok());
     let barred = barred.map_or(0, |barred| barred.iter().filter(|&&barred| barred).count());
     match experiment.simulated(job.nodes, goes_on) {
-        Ok(run) if run.outcome == Outcome::Finished => Ok(Figures::of(&run, usize::from(job.nodes) - barred)),
+        Ok(run) if run.outcome == Outcome::Finished => {
+            let budgeted = job.memory_mib.is_some() && job.nodes > 1;
+            let pilot_seconds = if budgeted { experiment.pilot_seconds() } else { 0.0 };
+            Ok(Figures::of(&run, usize::from(job.nodes) - barred, pilot_seconds))
+        }
         Ok(run) => Err(failed(format!("{:?}", run.outcome))),
         Err(RunError::NoCandidate(_)) => Err(Without::Nobody),
         Err(RunError::NoFit(_)) => Err(Without::Memory),

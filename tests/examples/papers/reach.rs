@@ -37,7 +37,7 @@ struct Goal {
 /// The rows of the task, but for the one that takes long.
 pub fn goals(bench: &Bench, published: &Published) -> Result<String> {
     let names = ["case", "published", "to reach", "dispatcher", "s", "speed-up", "eff. %", "busy %"];
-    let more = ["loading, s", "gathering, s", "memory of a node, KiB", "reached", "command"];
+    let more = ["pilot, s", "loading, s", "gathering, s", "memory of a node, KiB", "reached", "command"];
     let mut table = Table::new(&[&names[..], &more].concat());
     for goal in goals_of(published)? {
         for is_dispatched_by_node in [false, true] {
@@ -78,7 +78,7 @@ fn figures(bench: &Bench, job: &Job, floor: &Floor) -> Vec<String> {
     let found = match bench.compared(job) {
         Ok(found) => found,
         Err(without) => {
-            let mut cells = vec![String::new(); 8];
+            let mut cells = vec![String::new(); 9];
             cells[0] = without.cell();
             return cells;
         }
@@ -95,6 +95,7 @@ fn figures(bench: &Bench, job: &Job, floor: &Floor) -> Vec<String> {
         format!("{:.2}", found.speedup),
         per_cent(found.efficiency),
         per_cent(run.busy),
+        format!("{:.2}", run.pilot_seconds),
         format!("{:.2}", run.loading_seconds),
         format!("{:.2}", run.gathering_seconds),
         (run.memory_high_water >> 10).to_string(),
@@ -185,6 +186,7 @@ pub fn thousand(bench: &Bench, _: &Published) -> Result<String> {
         "speed-up",
         "eff. %",
         "busy %",
+        "pilot, s",
         "loading, s",
         "gathering, s",
         "memory of a node, KiB",
@@ -228,6 +230,7 @@ fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job, light_caches_fit: bool)
         ("nothing forwarded: `demand-driven`", changed(&|job| job.policy = Policy::DemandDriven)),
         ("pyramids of 8 x 8 pixels instead of 16 x 16", changed(&|job| job.bundle_tiles = Some(1))),
         ("tiles given out by a node instead of the host", changed(&|job| job.is_dispatched_by_node = true)),
+        ("no pilot: owners by space, equal numbers of tiles, no copies", changed(&|job| job.pilot = false)),
         ("no subhosts: the host clips for all", changed(&|job| job.subhosts = Some(0))),
         ("no take-over at the end of the picture", changed(&|job| job.take_over = false)),
         (

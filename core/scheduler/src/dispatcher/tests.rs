@@ -441,7 +441,7 @@ fn what_is_not_begun_goes_to_who_has_nothing() {
     assert!(dispatcher.is_idle());
 }
 
-/// Who had nothing to share is not told to again before it has ended a run.
+/// Who had nothing to share is not told to again before it has ended a run, or a while has passed, longer each time.
 #[test]
 fn who_had_nothing_to_share_is_left_alone() {
     let mut nodes = vec![NodeState::default(); 3];
@@ -457,9 +457,19 @@ fn who_had_nothing_to_share_is_left_alone() {
     dispatcher.handle(2, &Message::Idle { given: false }, 1);
     dispatcher.poll(&mut wire, 1);
     assert_eq!(wire.shared, [(1, 2)]);
-    dispatcher.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 5 }, 2);
-    dispatcher.poll(&mut wire, 2);
-    assert_eq!(wire.shared, [(1, 2), (1, 2)]);
+    let mut last = 1;
+    for (times, wait) in [(2, 2 * WORD), (3, 4 * WORD), (4, 8 * WORD)] {
+        dispatcher.poll(&mut wire, last + wait - 1);
+        assert_eq!(wire.shared.len(), times - 1);
+        last += wait;
+        dispatcher.poll(&mut wire, last);
+        assert_eq!(wire.shared.len(), times);
+        dispatcher.handle(2, &Message::Idle { given: false }, last);
+    }
+    wire.shared.clear();
+    dispatcher.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 5 }, last);
+    dispatcher.poll(&mut wire, last);
+    assert_eq!(wire.shared, [(1, 2)]);
 }
 
 /// Parts that are thought to be equal: each node has half of its own first; who gives tiles out has only its own.
