@@ -13,7 +13,11 @@ use toy::{SCENE_HASH, Toy};
 
 /// Messages that were sent.
 #[derive(Default)]
-struct Sent(Vec<(Peer, Message)>);
+struct Sent {
+    taken: Vec<(Peer, Message)>,
+    /// Times that there is no room for tiles that go back.
+    refused: usize,
+}
 
 impl Link for Sent {
     fn me(&self) -> Peer {
@@ -25,7 +29,12 @@ impl Link for Sent {
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
         let mut room = vec![0; bytes_max];
         let bytes = write(&mut room);
-        self.0.push((to, decode(&room[..bytes]).expect("a node makes sense").message));
+        let message = decode(&room[..bytes]).expect("a node makes sense").message;
+        if matches!(message, Message::Back { .. }) && self.refused > 0 {
+            self.refused -= 1;
+            return false;
+        }
+        self.taken.push((to, message));
         true
     }
     fn receive(&mut self, _: &mut dyn FnMut(Event<'_>)) -> bool {
@@ -48,14 +57,15 @@ fn check_with(tiles: u32, runs: &[Message], from: Peer, message: Message, expect
     let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
     let (scene, settings) = (toy.scene(&pages), Settings::default());
     let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
-    let mut link = Sent::default();
+    // The way to the dispatcher is full for a while.
+    let mut link = Sent { refused: 2, ..Sent::default() };
     node.handle(HOST, &View { message: Message::Begin(Toy::frame(8 * tiles, 8, 1)), body: &[] });
     node.poll(&mut link, 0);
-    link.0.clear();
+    link.taken.clear();
     runs.iter().for_each(|run| node.handle(HOST, &View { message: *run, body: &[] }));
     let body = vec![0; message.body_bytes()];
     node.handle(from, &View { message, body: &body });
-    for now in 1..4 {
+    for now in 1..8 {
         node.step(&mut || 0);
         node.poll(&mut link, now);
     }
@@ -64,9 +74,9 @@ fn check_with(tiles: u32, runs: &[Message], from: Peer, message: Message, expect
         Message::Rays { rays, shadows, .. } => Message::Rays { rays, shadows, load: 0 },
         other => other,
     };
-    link.0.retain(|(_, message)| !matches!(message, Message::Contributions { .. }));
-    link.0.iter_mut().for_each(|(_, message)| *message = done(*message));
-    assert_eq!(link.0, expected);
+    link.taken.retain(|(_, message)| !matches!(message, Message::Contributions { .. }));
+    link.taken.iter_mut().for_each(|(_, message)| *message = done(*message));
+    assert_eq!(link.taken, expected);
 }
 
 #[test]
@@ -94,6 +104,7 @@ fn who_has_tiles_that_are_not_begun_gives_half_of_them_back() {
     let share = Message::Share { with: 2 };
     check_with(5, &[run(0, 5, 0)], HOST, share, &[back(3, 2), done(0, 3)]);
     check_with(5, &[run(0, 2, 0), run(2, 3, 0)], HOST, share, &[back(2, 3), done(0, 2)]);
+    check_with(8, &[run(0, 2, 0), run(2, 6, 0)], HOST, share, &[back(4, 4), done(0, 2), done(2, 2)]);
     // One that is traced again stays: others may know of it under another epoch. So does a node's only tile.
     let nothing = (2, Message::Rays { rays: 0, shadows: 0, load: 0 });
     check_with(5, &[run(0, 3, 1)], HOST, share, &[nothing, done(0, 3)]);
@@ -112,7 +123,8 @@ fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
     let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
     let settings = Settings { subhosts: Some(subhosts), ..Settings::default() };
     let mut node = Node::new(toy.scene(&pages), All(&pages), SCENE_HASH, Kernels::Portable, 2, HOST, settings, memory);
-    let mut link = Sent::default();
+    // The way to the dispatcher is full for a while.
+    let mut link = Sent { refused: 2, ..Sent::default() };
     node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
     node.handle(HOST, &View { message: Message::Tiles { first: 0, count: 1, epoch: 0 }, body: &[] });
     let mut turn = |node: &mut Node<'_, '_, All<'_>>| {
@@ -127,7 +139,7 @@ fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
         event(&mut node);
         traced.push(turn(&mut node));
     }
-    let asked = |peer| link.0.iter().filter(|sent| **sent == (peer, Message::Clip { first: 0, count: 1 })).count();
+    let asked = |peer| link.taken.iter().filter(|sent| **sent == (peer, Message::Clip { first: 0, count: 1 })).count();
     assert_eq!([asked(HOST), asked(1)], [usize::from(subhosts == 0), usize::from(subhosts == 1)]);
     traced
 }

@@ -182,12 +182,12 @@ mod tests {
             let (nodes, tiles, step) =
                 (1 + random.below(40) as u16, 1 + random.below(900) as u32, 1 + random.below(3) as u32);
             let most = [1, 10, 1000][random.below(3) as usize];
-            let looks: Vec<_> = (0..tiles.div_ceil(step))
-                .map(|_| Look {
-                    cost: 1 + random.below(most),
-                    pages: (0..random.below(4)).map(|_| random.below(9) as u32).collect(),
-                })
-                .collect();
+            // The second half costs much more: parts of equal numbers of tiles would be far off.
+            let look = |tile: u32, random: &mut Random| Look {
+                cost: 1 + if tile < tiles / 2 { 0 } else { random.below(most) },
+                pages: (0..random.below(4)).map(|_| random.below(9) as u32).collect(),
+            };
+            let looks = (0..tiles).step_by(step as usize).map(|tile| look(tile, random)).collect();
             let pilot = Pilot { tiles, step, looks, ..Pilot::default() };
             let first = if seed % 2 == 0 { 1.0 } else { random.below(100) as f64 / 100.0 };
             let Parts { bounds, uses } = pilot.parts(nodes, first);

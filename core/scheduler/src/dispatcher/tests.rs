@@ -432,12 +432,14 @@ fn what_is_not_begun_goes_to_who_has_nothing() {
     dispatcher.handle(1, &Message::Back { with: 3, first: 2, count: 2 }, 2);
     dispatcher.poll(&mut wire, 2);
     assert_eq!(wire.take(), [(3, 2, 2, 0)]);
+    // Whoever is through with them can be helped again.
+    dispatcher.handle(3, &Message::Done { first: 2, count: 2, nanoseconds: 5 }, 3);
+    dispatcher.poll(&mut wire, 3);
+    assert_eq!((wire.shared.len(), wire.shared[1].1), (2, 3));
     for (peer, first, count) in [(1, 0, 4), (1, 0, 2), (2, 4, 4)] {
         assert!(!dispatcher.is_idle());
         dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
     }
-    assert!(!dispatcher.is_idle());
-    dispatcher.handle(3, &Message::Done { first: 2, count: 2, nanoseconds: 5 }, 3);
     assert!(dispatcher.is_idle());
 }
 
