@@ -43,6 +43,12 @@ impl Sizes {
             lights: scene.shading.lights.len(),
         }
     }
+
+    /// Bytes of pages that a node owns at most where shares are even: one page more than the mean.
+    #[must_use]
+    pub fn even_share(&self, nodes: u16) -> u64 {
+        (self.pages_bytes / u64::from(nodes.max(1)) + self.page_bytes_max as u64).min(self.pages_bytes)
+    }
 }
 
 /// Why a budget does not do, and how many bytes for each node would.
@@ -76,11 +82,6 @@ const PLACES_MIN: usize = 2;
 const TILES: (u64, u64, u64) = (64, 8, 256);
 const RAYS: (u64, u64, u64) = (16, 256, 16_384);
 const PARTIALS: (u64, u64, u64) = (64, 64, 4_096);
-
-/// Bytes of pages that a node owns at most where shares are even: one page more than the mean.
-fn even_share(sizes: &Sizes, nodes: u16) -> u64 {
-    (sizes.pages_bytes / u64::from(nodes.max(1)) + sizes.page_bytes_max as u64).min(sizes.pages_bytes)
-}
 
 /// What the node takes for its copies that has most, bytes in whole lines: each node's are a list of pages.
 #[must_use]
@@ -125,7 +126,7 @@ impl Plan {
         let place_lines = lines_for(sizes.page_bytes_max);
         let line = size_of::<Line>() as u64;
         let least = plan.least_bytes();
-        let owned = owned_max.unwrap_or(even_share(&sizes, nodes));
+        let owned = owned_max.unwrap_or(sizes.even_share(nodes));
         let room = memory.saturating_sub(least);
         if memory < least || room < owned {
             // The shares grow with the budget, but slower: the first that is enough is met from below.
@@ -220,7 +221,7 @@ impl Plan {
     pub fn with_page_memory(mut self, bytes: u64, nodes: u16, owned_max: Option<u64>) -> Self {
         let line = size_of::<Line>() as u64;
         if self.lines as u64 * line > bytes {
-            let owned = owned_max.unwrap_or(even_share(&self.sizes, nodes));
+            let owned = owned_max.unwrap_or(self.sizes.even_share(nodes));
             let place_lines = lines_for(self.sizes.page_bytes_max);
             let places = bytes.saturating_sub(owned) / (place_lines as u64 * line);
             self.places = (places as usize).clamp(PLACES_MIN, self.sizes.pages + PLACES_MIN);

@@ -84,8 +84,8 @@ impl Fit {
     ///
     /// # Errors
     /// If there is no room for as many as were asked for.
-    pub fn with_light_caches(self, wanted: &Wanted, bytes: Option<u64>, scene: &Scene<'_>) -> Result<Self, PlanError> {
-        let memory = wanted.page_memory.map_or(wanted.memory, |_| self.plan.sum().total_bytes());
+    fn with_light_caches(self, wanted: &Wanted, bytes: Option<u64>, scene: &Scene<'_>) -> Result<Self, PlanError> {
+        let memory = wanted.memory_of(&self.plan);
         let (plan, light_caches) =
             light_caches(self.plan, memory, bytes, wanted.policy, scene, &self.owners, wanted.nodes)?;
         Ok(Self { plan, copies: light_caches.pages.clone(), light_caches, ..self })
@@ -147,15 +147,14 @@ impl Wanted {
             return Ok(fit.with_light_caches(self, light_cache, scene)?);
         };
         let parts = pilot.parts(self.nodes, if self.first_dispatches { dispatchers_share(self.nodes) } else { 1.0 });
-        let even = self.sizes.pages_bytes / u64::from(self.nodes) + self.sizes.page_bytes_max as u64;
-        let owned_max = even.min(self.plan(None)?.owned_bytes_max());
+        let owned_max = self.sizes.even_share(self.nodes).min(self.plan(None)?.owned_bytes_max());
         if let Some(owners) = owners_by_use(pages, &parts, owned_max).filter(|_| !fit.plan.holds_all) {
             let owned_bytes = owned_bytes(pages, &owners, self.nodes);
             let plan = self.plan(owned_bytes.iter().max().copied())?;
             fit = Fit { owners, owned_bytes, plan, ..fit };
         }
         let base = fit.plan;
-        let memory = self.page_memory.map_or(self.memory, |_| base.sum().total_bytes());
+        let memory = self.memory_of(&base);
         fit = fit.with_light_caches(self, light_cache, scene)?;
         if !fit.plan.holds_all {
             let most = fit.plan.room_for_copies(memory) / COPIES.1 * COPIES.0;
@@ -165,6 +164,11 @@ impl Wanted {
             fit.plan = base.with_copies(bytes_of_copies(scene.resident.directory.entries, &fit.copies), memory)?;
         }
         Ok(Fit { parts: parts.bounds, ..fit })
+    }
+
+    /// What a node of this plan may take in all: no more than now where page memory is limited.
+    fn memory_of(&self, plan: &Plan) -> u64 {
+        self.page_memory.map_or(self.memory, |_| plan.sum().total_bytes())
     }
 
     /// Whole KiB for each of so many nodes that do, such that one KiB less does not; `None` if a TiB does not.

@@ -96,24 +96,24 @@ impl<'a> Experiment<'a> {
         let packed = &self.prepared.packed;
         let first_dispatches = self.dispatcher != HOST;
         let wanted = Wanted { sizes, nodes, memory, page_memory, policy, first_dispatches };
-        let pilot = self.pilot(policy).filter(|_| self.has_pilot);
+        let pilot = self.pilot(policy);
         let (pages, voxels) = (packed.placed_pages(), packed.voxels());
         wanted.fit_picture(&pages, voxels, self.scene, self.light_cache, pilot).map(Some)
     }
 
-    /// What went ahead of the picture, where `policy` has a pilot.
+    /// What went ahead of the picture, where `policy` has a pilot and it is wanted: traced once.
     #[must_use]
     pub fn pilot(&self, policy: Policy) -> Option<&Pilot> {
-        let trace = || Pilot::of_policy(Policy::Hybrid, self.scene, self.frame);
-        if policy == Policy::Hybrid { self.pilot.get_or_init(trace).as_ref() } else { None }
+        if policy != Policy::Hybrid || !self.has_pilot {
+            return None;
+        }
+        self.pilot.get_or_init(|| Pilot::trace(self.scene, self.frame)).as_ref()
     }
 
     /// What one of the machine's nodes would have taken for the pilot, seconds: time before the first tile.
     #[must_use]
     pub fn pilot_seconds(&self) -> f64 {
-        let Some(Pilot { walks, counts, .. }) = self.pilot(self.settings.policy).filter(|_| self.has_pilot) else {
-            return 0.0;
-        };
+        let Some(Pilot { walks, counts, .. }) = self.pilot(self.settings.policy) else { return 0.0 };
         let operations = Operations {
             cells: walks.nodes,
             blocks: walks.blocks,
