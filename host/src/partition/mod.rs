@@ -15,6 +15,6 @@ pub use barred::{NoCandidate, barred};
 pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
 pub use light_cache::{LightCaches, light_caches};
 pub use owners::{Misfit, PlacedPage, owners};
-pub use pilot::{Parts, Pilot};
+pub use pilot::{PILOT_RAYS, Parts, Pilot};
 pub use placement::{copies, owners_by_use};
 pub use voxels::{Plan, Step, VOXELS_MAX, Voxels};

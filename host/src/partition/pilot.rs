@@ -2,6 +2,7 @@
 //!
 //! Up to four rays in each tile, and all that they cause, stand for the tile: what they cost says how the picture is best
 //! divided, and which pages they open says where pages are best kept. No picture depends on it, only the time that it takes.
+//! All processors of the host work at it; what is found does not depend on how many they are.
 
 use bytemuck::Zeroable;
 use hybray_bintree::walk::{self, FROM_ROOT, Stack};
@@ -14,9 +15,11 @@ use hybray_shading::{Camera, id};
 use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker};
 use hybray_wire::{Counts, Frame, RayKind, RayRecord, TileMap};
 use std::cell::RefCell;
+use std::num::NonZero;
+use std::ops::Range;
 
-/// Rays of the picture that are traced at most, those that they cause not counted.
-const RAYS_MAX: u32 = 16_384;
+/// Rays of the picture that are traced at most if nobody says, those that they cause not counted.
+pub const PILOT_RAYS: u32 = 16_384;
 /// Where in a tile, in quarters of its side: the middle if it is only one.
 const PLACES: [[u32; 2]; 4] = [[1, 1], [3, 3], [3, 1], [1, 3]];
 /// What a ray and a hit cost beside their walk, in nodes and blocks.
@@ -74,24 +77,22 @@ impl Sink for Nowhere {
     fn ended(&mut self, _: &Origin, _: u64) {}
 }
 
-impl Pilot {
-    /// What goes ahead of `frame` under `policy`: the others than `hybrid` place pages as published.
-    #[must_use]
-    pub fn of_policy(policy: Policy, scene: &Scene<'_>, frame: &Frame) -> Option<Self> {
-        (policy == Policy::Hybrid).then(|| Self::trace(scene, frame)).flatten()
-    }
+/// What is looked at ahead of a picture.
+struct Ahead<'a> {
+    scene: &'a Scene<'a>,
+    frame: &'a Frame,
+    camera: Camera,
+    map: TileMap,
+    step: u32,
+    places: &'a [[u32; 2]],
+}
 
-    /// Traces some rays of `frame`, with every page at hand. `None` if the picture cannot be drawn.
-    ///
-    /// The portable kernels count the same on every processor, so that what is decided by it is the same, too.
-    #[must_use]
-    pub fn trace(scene: &Scene<'_>, frame: &Frame) -> Option<Self> {
-        let Frame { width, height, .. } = *frame;
-        let (eye, target, up) = (frame.eye.into(), frame.target.into(), frame.up.into());
-        let camera = Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, width, height).ok()?;
-        let map = TileMap::new(width, height)?;
-        let (tiles, depth_max) = (map.len(), usize::from(frame.depth_max).min(DEPTH_MAX));
-        let mut scene = *scene;
+impl Ahead<'_> {
+    /// Takes the looks of these numbers: one every `step` tiles.
+    fn look(&self, looks: Range<u32>) -> Pilot {
+        let Self { frame, map, .. } = self;
+        let depth_max = usize::from(frame.depth_max).min(DEPTH_MAX);
+        let mut scene = *self.scene;
         scene.shading.ray_depth_max = depth_max as u32;
         scene.shading.weight_cutoff = frame.weight_cutoff;
         let watched = Watched { pages: scene.resident.pages, opened: RefCell::default() };
@@ -100,24 +101,22 @@ impl Pilot {
         let mut walker =
             Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
         let mut counts = Counts::default();
-        let step = tiles.div_ceil(RAYS_MAX);
-        let places = &PLACES[..((RAYS_MAX / tiles.max(1)).clamp(1, 4)) as usize];
         let cost = |walker: &Walker<'_>, counts: &Counts| {
             let rays = counts.primary + counts.secondary + counts.shadow;
             walker.counts.nodes + walker.counts.blocks + RAY_COST * (rays + counts.hits)
         };
-        let mut looks = Vec::new();
-        for tile in (0..tiles).step_by(step as usize) {
+        let mut found = Vec::new();
+        for tile in looks.map(|look| look * self.step) {
             let (before, shape) = (cost(&walker, &counts), map.tile(tile));
-            for [right, down] in places.iter().map(|&place| if places.len() == 1 { [2, 2] } else { place }) {
+            for [right, down] in self.places.iter().map(|&place| if self.places.len() == 1 { [2, 2] } else { place }) {
                 let (x, y) = (shape.x + shape.width * right / 4, shape.y + shape.height * down / 4);
-                let seen = camera.ray(x, y, [0.5; 2]);
+                let seen = self.camera.ray(x, y, [0.5; 2]);
                 let ray = RayRecord {
                     origin: seen.origin.to_array(),
                     direction: seen.direction.to_array(),
                     t_min: seen.t_min,
                     t_max: f32::INFINITY,
-                    id: id::primary_id(frame.seed, y * width + x, 0),
+                    id: id::primary_id(frame.seed, y * frame.width + x, 0),
                     primitive: Candidate::NOTHING,
                     weight: [1.0; 3],
                     page: FROM_ROOT,
@@ -133,9 +132,61 @@ impl Pilot {
                     let _ = lane.step(&scene, &mut walker, &mut Nowhere, &mut counts);
                 }
             }
-            looks.push(Look { cost: cost(&walker, &counts) - before, pages: watched.opened.take() });
+            found.push(Look { cost: cost(&walker, &counts) - before, pages: watched.opened.take() });
         }
-        Some(Self { tiles, step, looks, walks: walker.counts, counts })
+        Pilot { looks: found, walks: walker.counts, counts, ..Pilot::default() }
+    }
+}
+
+impl Pilot {
+    /// What goes ahead of `frame` under `policy`, of at most so many rays: the others than `hybrid` place pages as published.
+    #[must_use]
+    pub fn of_policy(policy: Policy, scene: &Scene<'_>, frame: &Frame, rays_max: u32) -> Option<Self> {
+        (policy == Policy::Hybrid).then(|| Self::trace(scene, frame, rays_max)).flatten()
+    }
+
+    /// Traces at most `rays_max` rays of `frame`, and what they cause, with every page at hand. `None` if it is none, or the
+    /// picture cannot be drawn.
+    ///
+    /// The portable kernels count the same on every processor, so that what is decided by it is the same, too.
+    #[must_use]
+    pub fn trace(scene: &Scene<'_>, frame: &Frame, rays_max: u32) -> Option<Self> {
+        let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+        Self::trace_with(scene, frame, rays_max, threads)
+    }
+
+    fn trace_with(scene: &Scene<'_>, frame: &Frame, rays_max: u32, threads: usize) -> Option<Self> {
+        let Frame { width, height, .. } = *frame;
+        let (eye, target, up) = (frame.eye.into(), frame.target.into(), frame.up.into());
+        let camera = Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, width, height).ok()?;
+        let map = TileMap::new(width, height)?;
+        let tiles = map.len();
+        if rays_max == 0 || tiles == 0 {
+            return None;
+        }
+        let step = tiles.div_ceil(rays_max);
+        let places = &PLACES[..((rays_max / tiles).clamp(1, 4)) as usize];
+        let ahead = Ahead { scene, frame, camera, map, step, places };
+        // Each thread has tiles that follow each other: pages are opened again while they are warm.
+        let looks = tiles.div_ceil(step);
+        let share = looks.div_ceil(threads.clamp(1, looks as usize) as u32);
+        let parts: Vec<Self> = std::thread::scope(|scope| {
+            let spawn = |first: u32| {
+                scope.spawn({
+                    let ahead = &ahead;
+                    move || ahead.look(first..(first + share).min(looks))
+                })
+            };
+            let threads: Vec<_> = (0..looks).step_by(share as usize).map(spawn).collect();
+            threads.into_iter().map(|thread| thread.join().expect("looking ahead does not panic")).collect()
+        });
+        let mut all = Self { tiles, step, ..Self::default() };
+        for part in parts {
+            all.looks.extend(part.looks);
+            all.walks += part.walks;
+            all.counts += part.counts;
+        }
+        Some(all)
     }
 
     /// Divides the picture among `nodes` into pieces that follow each other and cost as much; the first node's is `first`
@@ -173,6 +224,32 @@ impl Pilot {
 mod tests {
     use super::super::owners::tests::Random;
     use super::*;
+    use crate::model::Settings;
+    use crate::prepare::Prepared;
+    use crate::{build, import};
+
+    /// Any number of threads finds the same, and no more rays are traced than were asked for but for one a tile.
+    #[test]
+    fn threads_do_not_matter() {
+        let model = import::load("spd:balls:2").unwrap();
+        let prepared = Prepared::new(model, &build::Settings::default()).unwrap();
+        let pages = prepared.packed.open().unwrap();
+        let scene = prepared.scene(&pages);
+        let size = Settings { size: Some([200, 90]), ..Settings::default() };
+        let frame = prepared.frame(&prepared.cameras[0], &size);
+        // 25 x 12 tiles.
+        for (rays_max, looks, places) in
+            [(1, 1, 1), (7, 7, 1), (100, 100, 1), (300, 300, 1), (899, 300, 2), (5000, 300, 4)]
+        {
+            let alone = Pilot::trace_with(&scene, &frame, rays_max, 1).unwrap();
+            assert_eq!((alone.tiles, alone.looks.len(), alone.counts.primary), (300, looks, looks as u64 * places));
+            assert!(alone.looks.iter().any(|look| !look.pages.is_empty()) && alone.walks.nodes > 0);
+            for threads in [2, 3, 7, 64, 1000] {
+                assert_eq!(Pilot::trace_with(&scene, &frame, rays_max, threads).as_ref(), Some(&alone), "{threads}");
+            }
+        }
+        assert_eq!(Pilot::trace(&scene, &frame, 0), None);
+    }
 
     /// Parts cost as much as each other, to within what can be had: a square of tiles more or less.
     #[test]

@@ -1,7 +1,7 @@
 //! Arguments.
 
 use crate::build::{Rule, Settings};
-use crate::partition::Voxels;
+use crate::partition::{PILOT_RAYS, Voxels};
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -126,13 +126,17 @@ pub(super) struct WorkArgs {
     pub take_over: Option<Switch>,
 }
 
-/// What of a node's memory is for shadow rays.
+/// Which pages nodes have from the beginning besides their own.
 #[derive(Clone, Copy, Debug, Args)]
-pub(super) struct LightArgs {
+pub(super) struct CopyArgs {
     /// Memory of each node for pages between its own and the lights, such as 4MiB, at most (the 1995 report's light caches): they
     /// are there from the start and stay. Default: with hybrid-1995 all, if they fit in half of what is left; else 0: none
     #[arg(long, value_name = "BYTES", value_parser = bytes_or_none, help_heading = BUDGET)]
     pub light_cache: Option<u64>,
+    /// Rays that the host traces before a picture with hybrid, at most, four a tile: they say which nodes need which pages, and
+    /// how to divide the picture. 0: none; pages are placed by space
+    #[arg(long, value_name = "RAYS", default_value_t = PILOT_RAYS, help_heading = BUDGET)]
+    pub pilot: u32,
 }
 
 impl WorkArgs {
@@ -311,7 +315,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub work: WorkArgs,
     #[command(flatten)]
-    pub light: LightArgs,
+    pub copies: CopyArgs,
     #[command(flatten)]
     pub tree: TreeArgs,
 }
@@ -336,7 +340,7 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "NAME", value_parser = machine())]
     pub machine: Option<&'static Machine>,
     #[command(flatten)]
-    pub light: LightArgs,
+    pub copies: CopyArgs,
     /// Write the plan in JSON to this file, or to standard output (`-`) instead of the table
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -394,7 +398,7 @@ pub(super) struct SimulateArgs {
     #[command(flatten)]
     pub work: WorkArgs,
     #[command(flatten)]
-    pub light: LightArgs,
+    pub copies: CopyArgs,
     /// Columns and rows, pixels
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,

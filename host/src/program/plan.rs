@@ -107,13 +107,13 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let scene = prepared.scene(&pages);
     let sizes = Sizes::of(&scene);
     let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
-    let pilot = Pilot::of_policy(args.scheduler, &scene, &frame).filter(|_| args.nodes > 1);
+    let pilot = Pilot::of_policy(args.scheduler, &scene, &frame, args.copies.pilot).filter(|_| args.nodes > 1);
     let farm = Farm {
         nodes: args.nodes,
         memory: args.memory,
         page_memory: args.page_memory.map(|page_memory| page_memory.bytes(sizes.pages_bytes)),
         policy: args.scheduler,
-        light_cache: args.light.light_cache,
+        light_cache: args.copies.light_cache,
         pilot: pilot.as_ref(),
         first_dispatches: false,
         nodes_most: NODES_MAX,

@@ -99,8 +99,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let scene = prepared.scene(&pages);
     let (mut fit, mut barred) = (None, Vec::new());
     if let Some(memory) = args.memory {
-        let light_cache = args.light.light_cache;
-        let pilot = Pilot::of_policy(policy, &scene, &frame).filter(|_| nodes > 1);
+        let light_cache = args.copies.light_cache;
+        let pilot = Pilot::of_policy(policy, &scene, &frame, args.copies.pilot).filter(|_| nodes > 1);
         let farm = BudgetFarm {
             nodes,
             memory,
@@ -261,7 +261,7 @@ fn check_budget(args: &RenderArgs, nodes: u16) -> Result<()> {
         ("--granularity", work.granularity.is_some()),
         ("--in-system", work.in_system.is_some()),
         ("--pyramid", work.pyramid.is_some()),
-        ("--light-cache", args.light.light_cache.is_some()),
+        ("--light-cache", args.copies.light_cache.is_some()),
         ("--tiles", work.tiles.is_some()),
         ("--demand-driven", work.demand_driven.is_some()),
         ("--subhosts", work.subhosts.is_some()),

@@ -51,6 +51,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let pages_bytes = Sizes::of(&scene).pages_bytes;
     let page_memory = args.page_memory.map(|page_memory| page_memory.bytes(pages_bytes));
     let mut experiment = Experiment::new(&prepared, &scene, &frame, args.machine);
+    experiment.pilot_rays = args.copies.pilot;
     experiment.dispatcher = match args.dispatcher {
         Where::Host => HOST,
         Where::Node => 1,
@@ -66,7 +67,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
             memory,
             page_memory,
             policy,
-            light_cache: args.light.light_cache,
+            light_cache: args.copies.light_cache,
             pilot: experiment.pilot(policy).filter(|_| nodes > 1),
             first_dispatches: experiment.dispatcher != HOST,
             nodes_most: NODES_MAX,
@@ -83,7 +84,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let mut report =
         Report { scene: args.scene.scene.clone(), machine: args.machine.name.to_owned(), ..Report::default() };
     (experiment.memory, experiment.page_memory) = (args.memory, page_memory);
-    experiment.light_cache = args.light.light_cache;
+    experiment.light_cache = args.copies.light_cache;
     for (policy, nodes) in farms {
         experiment.settings = args.work.settings(args.machine.settings(policy));
         experiment.options = args.work.options(args.spread, args.tile, &experiment.settings);

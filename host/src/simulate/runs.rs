@@ -4,7 +4,7 @@
 //! made once for all the others.
 
 use super::record::{NodeRun, QueueRun, Rays, Run};
-use crate::partition::{Fit, NoCandidate, NoFit, Pilot, Voxels, Wanted, barred};
+use crate::partition::{Fit, NoCandidate, NoFit, PILOT_RAYS, Pilot, Voxels, Wanted, barred};
 use crate::prepare::Prepared;
 use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::{Criterion, Policy};
@@ -36,8 +36,8 @@ pub struct Experiment<'a> {
     pub page_memory: Option<u64>,
     /// What of that is for light caches, bytes; as the policy has it if it is not given.
     pub light_cache: Option<u64>,
-    /// Whether a pilot goes ahead where the policy has one.
-    pub has_pilot: bool,
+    /// Rays at most that go ahead of the picture where the policy has a pilot; 0 for none.
+    pub pilot_rays: u32,
     /// What rays of the picture found that were ahead of it, when that was asked for.
     pilot: OnceCell<Option<Pilot>>,
     /// Which nodes are given tiles, where they have memory; one alone always is.
@@ -76,7 +76,7 @@ impl<'a> Experiment<'a> {
             memory: None,
             page_memory: None,
             light_cache: None,
-            has_pilot: true,
+            pilot_rays: PILOT_RAYS,
             pilot: OnceCell::new(),
             criterion: Criterion::All,
             voxels: Voxels::One,
@@ -104,10 +104,10 @@ impl<'a> Experiment<'a> {
     /// What went ahead of the picture, where `policy` has a pilot and it is wanted: traced once.
     #[must_use]
     pub fn pilot(&self, policy: Policy) -> Option<&Pilot> {
-        if policy != Policy::Hybrid || !self.has_pilot {
+        if policy != Policy::Hybrid {
             return None;
         }
-        self.pilot.get_or_init(|| Pilot::trace(self.scene, self.frame)).as_ref()
+        self.pilot.get_or_init(|| Pilot::trace(self.scene, self.frame, self.pilot_rays)).as_ref()
     }
 
     /// What one of the machine's nodes would have taken for the pilot, seconds: time before the first tile.

@@ -311,6 +311,13 @@ fn light_caches_are_planned() {
     let (piloted, both) = (plan(""), plan("--light-cache 20000"));
     assert_eq!((term(&piloted).1, term(&piloted).2, term(&both).2), (0, 0, 3));
     assert!(term(&piloted).0 > 0 && whole(&piloted, "/copies_least") > 0 && term(&both).0 > bytes);
+    // Without one there is none of that; fewer rays find something else.
+    let pilot = |rays: u32| whole(&plan(&format!("--pilot {rays}")), "/copies_most");
+    assert_eq!((pilot(0), pilot(16_384)), (0, whole(&piloted, "/copies_most")));
+    assert_ne!(
+        (pilot(30), whole(&plan("--pilot 30"), "/copies_least")),
+        (pilot(16_384), whole(&piloted, "/copies_least"))
+    );
     for r in [&piloted, &both] {
         assert!(whole(r, "/total_bytes") <= 256 * 1024 && whole(r, "/cache_places") > 2, "{r}");
     }

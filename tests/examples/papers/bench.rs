@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use hybray::build::Settings as Build;
 use hybray::model::Settings as Wanted;
+use hybray::partition::PILOT_RAYS;
 use hybray::prepare::Prepared;
 use hybray::simulate::runs::{Experiment, RunError};
 use hybray_scheduler::policy::{Criterion, Policy, Tiles};
@@ -61,8 +62,8 @@ pub struct Job {
     pub subhosts: Option<u16>,
     /// Nodes that have nothing to do at the end are given rays of others.
     pub take_over: bool,
-    /// A pilot goes ahead, if the policy has one.
-    pub pilot: bool,
+    /// Rays of the pilot at most, if the policy has one.
+    pub pilot: u32,
 }
 
 impl Job {
@@ -90,7 +91,7 @@ impl Job {
             criterion: Criterion::All,
             subhosts: None,
             take_over: true,
-            pilot: true,
+            pilot: PILOT_RAYS,
         }
     }
 
@@ -108,7 +109,7 @@ impl Job {
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
         let same = Self { tiles: Tiles::Dynamic, criterion: Criterion::All, take_over: true, ..self.clone() };
-        let same = Self { subhosts: None, pilot: true, ..same };
+        let same = Self { subhosts: None, pilot: PILOT_RAYS, ..same };
         Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..same }
     }
 }
@@ -306,7 +307,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
     let mut experiment = Experiment::new(prepared, &scene, &frame, machine);
     experiment.dispatcher = job.is_dispatched_by_node.into();
     let Job { atomic, tiles, take_over, criterion, .. } = *job;
-    experiment.has_pilot = job.pilot;
+    experiment.pilot_rays = job.pilot;
     experiment.options = Options { spread: job.spread.map(f32::from), atomic, tiles, take_over };
     (experiment.criterion, experiment.voxels) = (criterion, job.voxels.parse().map_err(failed)?);
     let settings = machine.settings(job.policy);

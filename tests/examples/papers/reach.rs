@@ -230,7 +230,9 @@ fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job, light_caches_fit: bool)
         ("nothing forwarded: `demand-driven`", changed(&|job| job.policy = Policy::DemandDriven)),
         ("pyramids of 8 x 8 pixels instead of 16 x 16", changed(&|job| job.bundle_tiles = Some(1))),
         ("tiles given out by a node instead of the host", changed(&|job| job.is_dispatched_by_node = true)),
-        ("no pilot: owners by space, equal numbers of tiles, no copies", changed(&|job| job.pilot = false)),
+        ("no pilot: owners by space, equal numbers of tiles, no copies", changed(&|job| job.pilot = 0)),
+        ("a pilot of 1,024 rays, one a tile, instead of four", changed(&|job| job.pilot = 1024)),
+        ("a pilot of 256 rays, one in four tiles", changed(&|job| job.pilot = 256)),
         ("no subhosts: the host clips for all", changed(&|job| job.subhosts = Some(0))),
         ("no take-over at the end of the picture", changed(&|job| job.take_over = false)),
         (
