@@ -26,7 +26,13 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
     let size = Some([96, 64]);
     let wanted = model::Settings { size, spp: Some(samples), depth: Some(4), ..model::Settings::default() };
     let frame = prepared.frame(&prepared.cameras[0], &wanted);
-    let farm = |nodes, dispatcher| Farm { nodes, kernels: kernels(), dispatcher, options: Options::default() };
+    let farm = |nodes, dispatcher| Farm {
+        nodes,
+        kernels: kernels(),
+        dispatcher,
+        shadow_bundles: true,
+        options: Options::default(),
+    };
     let expected =
         trace(&scene, prepared.hash, &frame, &farm(1, DispatcherAt::Host), &mut |_| true).expect("a picture");
     let seed = name.bytes().fold(page_bytes as u64, |seed, byte| seed.wrapping_mul(31) + u64::from(byte));
@@ -54,7 +60,8 @@ fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
                 light_pages += caches.pages.iter().map(Vec::len).sum::<usize>();
                 let (pages, copies) = (&pages, &caches.pages);
                 let budget = Budget { memory, owners: &owners, pages, copies, parts: &[], settings, barred: &barred };
-                let farm = Farm { options, ..farm(nodes, dispatcher) };
+                let shadow_bundles = ways.below(3) > 0;
+                let farm = Farm { shadow_bundles, options, ..farm(nodes, dispatcher) };
                 let what = || {
                     let lights = caches.bytes;
                     format!(

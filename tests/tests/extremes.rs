@@ -43,7 +43,13 @@ fn scaled(mut model: Model, log2: i32) -> Model {
 
 fn check_scaled(name: &str, powers: &[i32]) {
     let wanted = Settings { size: Some([64, 48]), spp: Some(2), depth: Some(5), ..Settings::default() };
-    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, options: Options::default() };
+    let farm = Farm {
+        nodes: 2,
+        kernels: kernels(),
+        dispatcher: DispatcherAt::Host,
+        shadow_bundles: true,
+        options: Options::default(),
+    };
     let draw = |model| Picture::of(model, &build::Settings::default(), &wanted, &farm, name);
     let expected = draw(scene(name));
     for &log2 in powers {

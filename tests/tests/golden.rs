@@ -37,7 +37,13 @@ const GOLDEN: [(&str, u64); 14] = [
 fn pictures_are_what_they_were() {
     let bless = std::env::var_os("HYBRAY_BLESS").is_some();
     let wanted = Settings { size: Some([48, 36]), spp: Some(2), ..Settings::default() };
-    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, options: Options::default() };
+    let farm = Farm {
+        nodes: 2,
+        kernels: kernels(),
+        dispatcher: DispatcherAt::Host,
+        shadow_bundles: true,
+        options: Options::default(),
+    };
     let mut wrong = Vec::new();
     for (name, expected) in GOLDEN {
         let Picture { film, .. } = Picture::of(scene(name), &build::Settings::default(), &wanted, &farm, name);

@@ -57,7 +57,7 @@ fn check(name: &str, rule: Rule, voxels: Voxels) {
     }
     let wanted = model::Settings { size: Some([48, 36]), spp: Some(2), ..model::Settings::default() };
     let options = Options { spread: None, atomic: Some(4), ..Options::default() };
-    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, options };
+    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, shadow_bundles: true, options };
     let expected = drawn(&built, &wanted, &farm, name);
     assert!(expected.counts.hits > 0, "{name}");
     assert_eq!(drawn(&opened, &wanted, &farm, name), expected, "{name}");

@@ -61,7 +61,13 @@ fn check(axis: usize, height: f32, size: f32) {
     let prepared = Prepared::new(model, &build::Settings::default()).unwrap();
     let pages = prepared.packed.open().unwrap();
     let frame = prepared.frame(&prepared.cameras[0], &wanted);
-    let farm = Farm { nodes: 1, kernels: kernels(), dispatcher: DispatcherAt::Host, options: Options::default() };
+    let farm = Farm {
+        nodes: 1,
+        kernels: kernels(),
+        dispatcher: DispatcherAt::Host,
+        shadow_bundles: true,
+        options: Options::default(),
+    };
     let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).unwrap();
     for (pixel, radiance) in traced.radiance.iter().enumerate() {
         assert!(radiance.iter().all(|c| (c - 1.0).abs() < 1e-4), "{what}: pixel {pixel} is {radiance:?}");
@@ -125,7 +131,13 @@ fn a_lamp_shines_through_glass() {
         let pages = prepared.packed.open().unwrap();
         let wanted = Settings { size: Some([16, 16]), spp: Some(1), ..Settings::default() };
         let frame = prepared.frame(&prepared.cameras[0], &wanted);
-        let farm = Farm { nodes: 1, kernels: kernels(), dispatcher: DispatcherAt::Host, options: Options::default() };
+        let farm = Farm {
+            nodes: 1,
+            kernels: kernels(),
+            dispatcher: DispatcherAt::Host,
+            shadow_bundles: true,
+            options: Options::default(),
+        };
         let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).unwrap();
         traced.radiance.iter().map(|r| r[0]).sum::<f32>() / 256.0
     };

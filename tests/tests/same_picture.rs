@@ -40,6 +40,7 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
         nodes: 1,
         kernels: Kernels::Portable,
         dispatcher: DispatcherAt::Host,
+        shadow_bundles: false,
         options: Options { spread: Some(1.0), atomic: Some(1), ..Options::default() },
     };
     let expected = drawn(&prepared[0], &wanted, &alone, name);
@@ -53,9 +54,11 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
     let kernels = deck(random, &[Kernels::Portable, Kernels::detect()]);
     let trees = deck(random, &[0, 1, 2, 3]);
     let tiles = deck(random, &[Tiles::Dynamic, Tiles::Static, Tiles::PixelCount { pixels: 300 }]);
+    let together = deck(random, &[true, true, false]);
     for i in 0..DRAWS {
         let options = Options { spread: spreads[i], atomic: atomics[i], tiles: tiles[i], take_over: i % 3 > 0 };
-        let farm = Farm { nodes: nodes[i], kernels: kernels[i], dispatcher: dispatchers[i], options };
+        let (nodes, kernels, dispatcher, shadow_bundles) = (nodes[i], kernels[i], dispatchers[i], together[i]);
+        let farm = Farm { nodes, kernels, dispatcher, shadow_bundles, options };
         let tree = &prepared[trees[i]];
         let what = format!("{name} {size:?} {filter}, tree {} of {} pages, {farm:?}", trees[i], tree.packed.pages());
         assert_eq!(drawn(tree, &wanted, &farm, &what), expected, "{what}");
@@ -84,4 +87,5 @@ same_picture! {
     cornell_mirror: "cornell:mirror" [73, 80] "tent";
     organic: "organic:2000" [96, 96] "gaussian";
     terrain: "terrain:5000" [96, 96] "box";
+    conference: "paper:conference:9" [72, 72] "box";
 }

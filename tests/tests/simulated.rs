@@ -37,8 +37,13 @@ fn simulated_nodes_draw_the_native_picture() {
     let farms = [(1, 0), (2, 1), (7, 0), (64, 1)];
     for name in ["spd:balls:2", "cornell:mirror"] {
         let prepared = Prepared::new(scene(name), &Settings::default()).unwrap();
-        let native =
-            Farm { nodes: 2, kernels: Kernels::detect(), dispatcher: DispatcherAt::Host, options: Options::default() };
+        let native = Farm {
+            nodes: 2,
+            kernels: Kernels::detect(),
+            dispatcher: DispatcherAt::Host,
+            shadow_bundles: true,
+            options: Options::default(),
+        };
         let expected = drawn(&prepared, &wanted, &native, name);
         for machine in &MACHINES {
             with(name, &wanted, machine, |experiment| {

@@ -155,6 +155,8 @@ impl Draw {
             in_system: one_of(random, &[1, 64, 4096]),
             requests: one_of(random, &[1, 2, 8, 16]),
             link: one_of(random, &[usual.link, LinkCost { message_ns: 1, byte_ps: 1 }]),
+            // Without drawing: what a seed draws stays as it was.
+            shadow_bundles: !random.0.is_multiple_of(4),
             ..usual
         };
         let options =

@@ -14,7 +14,7 @@ fn check(name: &str) {
     let size = Some([56, 42]);
     let wanted = model::Settings { size, spp: Some(1), depth: Some(4), ..model::Settings::default() };
     let options = Options { spread: None, atomic: Some(4), ..Options::default() };
-    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, options };
+    let farm = Farm { nodes: 2, kernels: kernels(), dispatcher: DispatcherAt::Host, shadow_bundles: true, options };
     let expected = {
         let prepared = Prepared::new(model.clone(), &Settings::default()).unwrap();
         assert_eq!(prepared.packed.voxels(), 1);

@@ -1,5 +1,7 @@
 //! A bundle of rays as four planes and a near bound that contain every one of them (DESIGN section 5).
 
+use core::borrow::Borrow;
+
 use crate::simd::{Lanes, Mask, Simd};
 use crate::{Aabb, Ray, UNIT_ROUNDOFF, Vec3, normalize};
 
@@ -16,6 +18,8 @@ pub struct Bundle {
     last_origin: f32,
     /// Units of `t` of the fastest ray for one unit along the axis, rounded down.
     t_per_depth: f32,
+    /// Boxes that no ray meets before this `t` are left out.
+    t_last: f32,
 }
 
 /// Rays further from the axis than this (cosine) are not a bundle: its planes would be almost flat.
@@ -27,8 +31,8 @@ impl Bundle {
     /// `None` if there are no rays, or they are not coherent: then they are traced singly. Bounded by two passes over
     /// the rays. Everything that rounding can do is in the margins: `tests/extremes` checks them in `f64`.
     #[must_use]
-    pub fn around<'a>(rays: impl Iterator<Item = &'a Ray> + Clone, magnitude: f32) -> Option<Self> {
-        let sum = rays.clone().fold(Vec3::ZERO, |s, r| s + r.direction / r.direction.length());
+    pub fn around<R: Borrow<Ray>>(rays: impl Iterator<Item = R> + Clone, magnitude: f32) -> Option<Self> {
+        let sum = rays.clone().map(|r| r.borrow().direction).fold(Vec3::ZERO, |s, d| s + d / d.length());
         let w = normalize(sum);
         if !w.is_finite() {
             return None;
@@ -47,7 +51,7 @@ impl Bundle {
         let (mut slope_lo, mut slope_hi) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         let mut fastest = 0.0f32;
         for ray in rays.clone() {
-            let d = ray.direction;
+            let d = ray.borrow().direction;
             let along = d.dot(w);
             if !(along >= COSINE_MIN * d.length()) {
                 return None;
@@ -64,11 +68,12 @@ impl Bundle {
         let mut last_origin = f32::NEG_INFINITY;
         let mut reach = magnitude;
         for ray in rays {
-            reach = reach.max(ray.origin.abs().max_element());
+            let origin = ray.borrow().origin;
+            reach = reach.max(origin.abs().max_element());
             for i in 0..5 {
-                offsets[i] = offsets[i].min(normals[i].dot(ray.origin));
+                offsets[i] = offsets[i].min(normals[i].dot(origin));
             }
-            last_origin = last_origin.max(w.dot(ray.origin));
+            last_origin = last_origin.max(w.dot(origin));
         }
         // A point of a ray is at most 2 sqrt(3) reach from its origin (inside the boxes), its slopes and both dot
         // products are off by a few roundings of terms of that size each, and slopes are at most 10.
@@ -81,7 +86,14 @@ impl Bundle {
             margins,
             last_origin: last_origin + margins[4],
             t_per_depth: (1.0 - 8.0 * UNIT_ROUNDOFF) / fastest,
+            t_last: f32::INFINITY,
         })
+    }
+
+    /// The same for rays of which none goes further than `t`.
+    #[must_use]
+    pub fn until(self, t: f32) -> Self {
+        Self { t_last: t, ..self }
     }
 
     /// Which of eight boxes any ray of the bundle may meet, and the least `t` at which one could.
@@ -98,7 +110,7 @@ impl Bundle {
         outside |= last.lt(simd.splat8(self.offsets[4] - self.margins[4])).bits();
         let depth = self.value(simd, 4, lo, hi) - simd.splat8(self.last_origin);
         let near = (depth * simd.splat8(self.t_per_depth)).or_greater(simd.splat8(0.0));
-        (!outside & 0xff, near.to_array())
+        (!outside & near.le(simd.splat8(self.t_last)).bits(), near.to_array())
     }
 
     /// `normal . corner` for eight boxes: the corner with `upper` coordinates where the normal points up.

@@ -48,6 +48,7 @@ mod distances;
 mod edge;
 mod midpoint;
 mod pyramid;
+pub mod shadow;
 mod traverse;
 mod tree;
 pub mod wide;

@@ -14,7 +14,7 @@ use hybray_scene::{BLOCK, Child, Directory, Kind, Node, PageView, Pages, Slot, W
 /// Rays of a bundle at most.
 pub const RAYS_MAX: usize = 256;
 /// Rays that go side by side.
-const GROUP: usize = 8;
+pub(crate) const GROUP: usize = 8;
 /// Leaves of a cliplist at most: a bundle with more is divided.
 const LIST_MAX: usize = 128;
 /// A bundle of this many rays or fewer is not divided: its rays go singly.
@@ -38,7 +38,7 @@ pub struct Leaf {
 /// What tracing a bundle needs: lent by the caller. About 9 KB.
 #[derive(Clone, Debug)]
 pub struct Scratch {
-    list: [Leaf; LIST_MAX],
+    pub(crate) list: [Leaf; LIST_MAX],
     waiting: [(u32, u32); STACK],
 }
 
@@ -230,7 +230,7 @@ const DIRECTORY: u32 = u32::MAX;
 
 /// Leaves and missing pages that the bundle meets, in no order; how many, or `None` if they do not fit the list.
 #[inline(always)]
-fn clip<S: Simd, P: Pages + ?Sized>(
+pub(crate) fn clip<S: Simd, P: Pages + ?Sized>(
     simd: S,
     scene: &Resident<'_, P>,
     bundle: &Bundle,
@@ -345,7 +345,7 @@ fn greatest(hits: &[Hit; GROUP]) -> f32 {
 
 /// Tests the rays in `met` against every primitive of a leaf; whether any best hit changed.
 #[inline(always)]
-fn leaf<S: Simd>(
+pub(crate) fn leaf<S: Simd>(
     simd: S,
     lanes: &LaneRay<S::F8>,
     kernels: &[RayKernel; GROUP],

@@ -16,6 +16,8 @@
 //! it does.
 //! Source: Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6), 1980.
 
+use core::ops::Range;
+
 use glam::Vec3;
 
 use crate::highlight;
@@ -152,19 +154,32 @@ pub fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32,
     shadow(scene, material, surface, &facing, light, first, weight, id, cursor)
 }
 
+/// The cursor positions of the shadow rays to the light that `cursor` is one of; none past the last light.
+#[must_use]
+pub fn of_one_light(scene: &Scene<'_>, cursor: u32) -> Range<u32> {
+    find_light(scene, cursor).map_or(0..0, |(light, first)| first..first.saturating_add(light.shadow_rays()))
+}
+
+/// What a material lets through of a shadow ray's `contribution`; `None` if nothing.
+#[must_use]
+pub fn let_through(scene: &Scene<'_>, material: u16, contribution: [f32; 3]) -> Option<[f32; 3]> {
+    let material = scene.materials.get(usize::from(material)).unwrap_or(&Material::MATT);
+    let left = channels(|c| contribution[c] * material.transmission[c]);
+    (left != [0.0; 3]).then_some(left)
+}
+
 /// What goes on of a shadow ray that meets this surface: where it starts again, and what is left of its contribution.
 /// `None` if the surface is opaque. The direction stays; the new `t_max` is the old one minus the hit's `t`.
 #[must_use]
 pub fn pass_through(scene: &Scene<'_>, surface: &Surface, contribution: [f32; 3]) -> Option<(Vec3, [f32; 3])> {
-    let material = material(scene, surface);
-    let left = channels(|c| contribution[c] * material.transmission[c]);
+    let left = let_through(scene, surface.material, contribution)?;
     let ahead = if surface.geometric_normal.dot(surface.incoming) < 0.0 {
         -surface.geometric_normal
     } else {
         surface.geometric_normal
     };
     let origin = offset_origin(surface.position, surface.error, ahead, ahead);
-    (left != [0.0; 3]).then_some((origin, left))
+    Some((origin, left))
 }
 
 /// Cosine between a spawned ray and the surface that it must at least have, some 0.001 degrees: more than the roundings

@@ -4,7 +4,7 @@ use hybray_bintree::cut::FLAT;
 use hybray_bintree::walk::Hit;
 use hybray_geometry::{Ray, RayKernel, SurfacePoint, Vec3, gamma};
 use hybray_scene::{BLOCK, Kind, PageView, Slot};
-use hybray_shading::{Surface, unpack_normal};
+use hybray_shading::{Surface, id, unpack_normal};
 use hybray_wire::RayRecord;
 
 /// Whom a ray and its children are traced for.
@@ -43,6 +43,10 @@ pub struct HitRecord {
     pub cursor: u32,
     /// One past the last child.
     pub end: u32,
+    /// Children of the cursor's 64 that were traced with others before their turn, the lowest bit for a multiple of 64.
+    pub done: u64,
+    /// Children before this have been tried together with others.
+    pub tried: u32,
     /// For whom.
     pub origin: Origin,
     /// 1 for a primary ray's hit.
@@ -69,9 +73,40 @@ impl HitRecord {
         children: 0,
         cursor: 0,
         end: 0,
+        done: 0,
+        tried: 0,
         origin: Origin { tile: 0, epoch: 0, home: 0, pixel: 0 },
         depth: 0,
     };
+}
+
+impl HitRecord {
+    /// Whether `child`, one of the cursor's 64, was traced before its turn.
+    pub(crate) fn is_done(&self, child: u32) -> bool {
+        child / 64 == self.cursor / 64 && self.done >> (child % 64) & 1 != 0
+    }
+
+    /// The cursor's child has had its turn.
+    pub(crate) fn advance(&mut self) {
+        self.cursor += 1;
+        if self.cursor.is_multiple_of(64) {
+            self.done = 0;
+        }
+    }
+
+    /// The next child's turn is that of one that was not traced before.
+    pub(crate) fn pass_over_done(&mut self) {
+        while self.cursor < self.end && self.is_done(self.cursor) {
+            self.advance();
+        }
+    }
+
+    /// The id of a child that is traced now: the record's entry will add it.
+    pub(crate) fn adopt(&mut self, branch: u32) -> u64 {
+        let id = id::child_id(self.id, branch);
+        self.children = self.children.wrapping_add(id);
+        id
+    }
 }
 
 /// The place of `hit` on its primitive, found by `ray` in `page`.

@@ -2,12 +2,13 @@
 
 use crate::hit::{HitRecord, Origin, surface};
 use crate::scene::Scene;
+use crate::together::{self, Together};
 use bytemuck::Zeroable;
 use hybray_bintree::walk::{self, FROM_ROOT, Hit, Stack, Walk, Walked};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
 use hybray_scene::{Pages, Slot};
-use hybray_shading::{Child, id, spawn};
+use hybray_shading::{Child, spawn};
 use hybray_wire::{Counts, RayKind, RayRecord};
 
 /// Where results go.
@@ -24,13 +25,25 @@ pub struct Walker<'s> {
     pub kernels: Kernels,
     /// Whether shadow rays are tested against all pages at hand first ([`Walk::past`]).
     pub past: bool,
+    /// Whether shadow rays that go to or from one place are traced together.
+    pub bundles: bool,
     /// Scratch of walks.
     pub stack: &'s mut Stack,
+    /// Scratch of bundles.
+    pub together: &'s mut Together,
     /// Nodes, blocks and pages.
     pub counts: walk::Counts,
+    /// Rays that were traced together with others so far.
+    pub ahead: u64,
 }
 
-impl Walker<'_> {
+impl<'s> Walker<'s> {
+    /// Traces each ray singly, until the first page that is not at hand.
+    #[must_use]
+    pub fn new(kernels: Kernels, stack: &'s mut Stack, together: &'s mut Together) -> Self {
+        Self { kernels, past: false, bundles: false, stack, together, counts: walk::Counts::default(), ahead: 0 }
+    }
+
     fn walk<const ANY: bool, P: Pages + ?Sized>(
         &mut self,
         scene: &Scene<'_, P>,
@@ -151,41 +164,12 @@ impl<'r> Lane<'r> {
         self.depth == 0
     }
 
-    /// Takes in a ray whose nearest hit is known, and whose hit's page is at hand: it becomes a record, or it ends here.
-    /// A hit that its page does not have (from a peer that lies) is no hit, and no entry: its tile will not balance.
+    /// Takes in a hit ([`begin`]).
     ///
     /// # Panics
-    /// If the ray is deeper than the lane.
-    pub fn start<S: Sink, P: Pages + ?Sized>(
-        &mut self,
-        scene: &Scene<'_, P>,
-        ray: &RayRecord,
-        hit: &Hit,
-        sink: &mut S,
-        counts: &mut Counts,
-    ) {
-        let origin = Origin::of(ray);
-        if !hit.candidate.is_hit() {
-            let seen: [f32; 3] = core::array::from_fn(|c| ray.weight[c] * scene.background[c]);
-            add(sink, &origin, seen);
-            sink.ended(&origin, ray.id.wrapping_neg());
-            return;
-        }
-        let Some(surface) = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, hit)) else {
-            return;
-        };
-        counts.hits += 1;
-        add(sink, &origin, spawn::local(&scene.shading, &surface, ray.weight));
-        self.records[self.depth] = HitRecord {
-            surface,
-            weight: ray.weight,
-            id: ray.id,
-            children: 0,
-            cursor: 0,
-            end: spawn::children(&scene.shading, &surface),
-            origin,
-            depth: ray.depth,
-        };
+    /// If it is deeper than the lane.
+    pub fn push(&mut self, record: HitRecord) {
+        self.records[self.depth] = record;
         self.depth += 1;
     }
 
@@ -209,12 +193,14 @@ impl<'r> Lane<'r> {
             return None;
         }
         let Some(hit) = walker.nearest(scene, &mut ray) else { return Some(ray) };
-        self.start(scene, &ray, &hit, sink, counts);
+        if let Some(record) = begin(scene, &ray, &hit, sink, counts) {
+            self.push(record);
+        }
         None
     }
 
-    /// Traces the next child of the deepest record, or ends it. A child that needs a page that is not at hand comes back.
-    /// Bounded: one walk, or one chain of a shadow ray.
+    /// Traces the next child of the deepest record, or its next shadow rays to one light, or ends it. A child that needs a
+    /// page that is not at hand comes back. Bounded: one walk, or one chain of a shadow ray; or a bundle of them.
     pub fn step<S: Sink, P: Pages + ?Sized>(
         &mut self,
         scene: &Scene<'_, P>,
@@ -224,13 +210,17 @@ impl<'r> Lane<'r> {
     ) -> Option<RayRecord> {
         let top = self.depth.checked_sub(1)?;
         let record = &mut self.records[top];
+        record.pass_over_done();
         if record.cursor == record.end {
             sink.ended(&record.origin, record.children.wrapping_sub(record.id));
             self.depth = top;
             return None;
         }
+        if walker.bundles && together::samples(scene, walker, record, sink, counts) {
+            return None;
+        }
         let cursor = record.cursor;
-        record.cursor += 1;
+        record.advance();
         let depth = u32::from(record.depth);
         let child = spawn::child(&scene.shading, &record.surface, record.weight, depth, record.id, cursor);
         let (kind, start, direction, t_max, weight, medium, branch) = match child {
@@ -245,8 +235,7 @@ impl<'r> Lane<'r> {
                 (RayKind::Refract, origin, direction, f32::INFINITY, weight, medium, branch)
             }
         };
-        let id = id::child_id(record.id, branch);
-        record.children = record.children.wrapping_add(id);
+        let id = record.adopt(branch);
         let origin = record.origin;
         let depth = match kind {
             RayKind::Shadow => record.depth,
@@ -278,8 +267,31 @@ impl<'r> Lane<'r> {
     }
 }
 
+/// Takes in a ray whose nearest hit is known, and whose hit's page is at hand: it becomes a record, or it ends here.
+/// A hit that its page does not have (from a peer that lies) is no hit, and no entry: its tile will not balance.
+pub fn begin<S: Sink, P: Pages + ?Sized>(
+    scene: &Scene<'_, P>,
+    ray: &RayRecord,
+    hit: &Hit,
+    sink: &mut S,
+    counts: &mut Counts,
+) -> Option<HitRecord> {
+    let origin = Origin::of(ray);
+    if !hit.candidate.is_hit() {
+        let seen: [f32; 3] = core::array::from_fn(|c| ray.weight[c] * scene.background[c]);
+        add(sink, &origin, seen);
+        sink.ended(&origin, ray.id.wrapping_neg());
+        return None;
+    }
+    let surface = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, hit))?;
+    counts.hits += 1;
+    add(sink, &origin, spawn::local(&scene.shading, &surface, ray.weight));
+    let end = spawn::children(&scene.shading, &surface);
+    Some(HitRecord { surface, weight: ray.weight, id: ray.id, end, origin, depth: ray.depth, ..HitRecord::EMPTY })
+}
+
 /// Zero adds nothing, and is not sent.
-fn add<S: Sink>(sink: &mut S, origin: &Origin, radiance: [f32; 3]) {
+pub(crate) fn add<S: Sink>(sink: &mut S, origin: &Origin, radiance: [f32; 3]) {
     if radiance != [0.0; 3] {
         sink.contribute(origin, radiance);
     }

@@ -7,7 +7,7 @@ use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Vec3};
 use hybray_scene::{PageView, Pages, parents};
 use hybray_shading::id;
-use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker};
+use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Together, Walker};
 use hybray_wire::{Counts, RayKind, RayRecord, ShadowRecord};
 use std::collections::BTreeMap;
 use world::{World, full_hall};
@@ -118,9 +118,10 @@ fn trace<P: Pages + ?Sized>(
     film: &mut Film,
     counts: &mut Counts,
     back: &mut Vec<RayRecord>,
+    bundles: bool,
 ) {
-    let (mut stack, mut room) = (Stack::new(), [HitRecord::EMPTY; 5]);
-    let mut walker = Walker { kernels, past: true, stack: &mut stack, counts: Default::default() };
+    let (mut stack, mut together, mut room) = (Stack::new(), Together::new(), [HitRecord::EMPTY; 5]);
+    let mut walker = Walker { past: true, bundles, ..Walker::new(kernels, &mut stack, &mut together) };
     let mut lane = Lane::new(&mut room);
     back.extend(lane.take(scene, &mut walker, ray, film, counts));
     while !lane.is_empty() {
@@ -135,7 +136,7 @@ fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
 
     let (mut expected, mut expected_counts, mut back) = (Film::default(), Counts::default(), Vec::new());
     for &ray in &primaries {
-        trace(scene, Kernels::Portable, ray, &mut expected, &mut expected_counts, &mut back);
+        trace(scene, Kernels::Portable, ray, &mut expected, &mut expected_counts, &mut back, false);
     }
     assert_eq!(back, [], "seed {seed}: every page is at hand");
     let owed = primaries.iter().fold(0u64, |sum, ray| sum.wrapping_sub(ray.id));
@@ -165,7 +166,7 @@ fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
         let store = with[random.below(with.len())];
         let kernels = kernels[random.below(2)];
         let mut back = Vec::new();
-        trace(&scene.at_hand(store), kernels, ray, &mut film, &mut counts, &mut back);
+        trace(&scene.at_hand(store), kernels, ray, &mut film, &mut counts, &mut back, random.below(2) == 0);
         for ray in back {
             assert!(!store.here[ray.page as usize], "seed {seed}: the page is at hand: {ray:?}");
             journeys.carried += 1;
@@ -185,9 +186,9 @@ fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
     assert_eq!(film.sorted(), expected.sorted(), "seed {seed}");
 }
 
-fn check_world(world: &World, transmits: bool) {
+fn check_world(world: &World, seeds: u64, transmits: bool) {
     let mut journeys = Journeys::default();
-    for seed in 0..24 {
+    for seed in 0..seeds {
         let page_bytes = [640, 1024, 2048][seed as usize % 3];
         world.with_pages(page_bytes, |scene| {
             assert_eq!(scene.transmits, transmits);
@@ -196,17 +197,19 @@ fn check_world(world: &World, transmits: bool) {
         });
     }
     println!("{journeys:?}");
-    assert!(journeys.nearest > 1000 && journeys.shadows > 1000 && journeys.settled > 100, "{journeys:?}");
+    assert!(journeys.nearest > 1000 && journeys.shadows > 1000 && journeys.settled > 4 * seeds, "{journeys:?}");
     assert_eq!(journeys.behind_glass > 100, transmits, "{journeys:?}");
     assert!(transmits || journeys.cut > 100, "{journeys:?}");
 }
 
 #[test]
 fn carried_rays_bring_the_same_through_glass() {
-    check_world(&full_hall(), true);
+    check_world(&full_hall(), 24, true);
+    check_world(&full_hall().softly_lit(), 3, true);
 }
 
 #[test]
 fn carried_rays_bring_the_same_without_glass() {
-    check_world(&full_hall().opaque(), false);
+    check_world(&full_hall().opaque(), 24, false);
+    check_world(&full_hall().softly_lit().opaque(), 3, false);
 }

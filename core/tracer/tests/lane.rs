@@ -6,7 +6,7 @@ use hybray_bintree::walk::{self, Stack};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Sphere, Triangle, Vec3};
 use hybray_shading::{Light, Material, id, spawn};
-use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker, surface};
+use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, TOGETHER, Together, Walker, begin, goes_together, surface};
 use hybray_wire::{Counts, RayKind, RayRecord, ShadowRecord};
 use world::{Shape, World, hall};
 
@@ -40,8 +40,12 @@ impl Record {
 
 const ORIGIN: Origin = Origin { tile: 5, epoch: 2, home: 3, pixel: 61 };
 
-fn walker(stack: &mut Stack) -> Walker<'_> {
-    Walker { kernels: Kernels::Portable, past: false, stack, counts: Default::default() }
+/// Scratch of a walker.
+#[derive(Default)]
+struct Room(Stack, Together);
+
+fn walker(room: &mut Room) -> Walker<'_> {
+    Walker::new(Kernels::Portable, &mut room.0, &mut room.1)
 }
 
 fn primary(origin: Vec3, direction: Vec3, id: u64) -> RayRecord {
@@ -64,12 +68,23 @@ fn primary(origin: Vec3, direction: Vec3, id: u64) -> RayRecord {
     }
 }
 
-/// Traces `ray` and all that it causes in a lane of `records` records.
+/// Traces `ray` and all that it causes in a lane of `records` records: it brings the same with bundles of shadow rays.
 fn trace(scene: &Scene<'_>, ray: &RayRecord, records: usize) -> (Record, Counts) {
-    let (mut record, mut counts, mut stack) = (Record::default(), Counts::default(), Stack::new());
+    let (single, counts) = trace_with(scene, ray, records, false);
+    let (mut together, counts_together) = trace_with(scene, ray, records, true);
+    assert_eq!((together.entries, together.ended, counts_together), (single.entries, single.ended, counts), "{ray:?}");
+    together.contributions.sort_unstable();
+    let mut sorted = single.contributions.clone();
+    sorted.sort_unstable();
+    assert_eq!(together.contributions, sorted, "{ray:?}");
+    (single, counts)
+}
+
+fn trace_with(scene: &Scene<'_>, ray: &RayRecord, records: usize, bundles: bool) -> (Record, Counts) {
+    let (mut record, mut counts, mut scratch) = (Record::default(), Counts::default(), Room::default());
     let mut room = vec![HitRecord::EMPTY; records];
     let mut lane = Lane::new(&mut room);
-    let mut walker = walker(&mut stack);
+    let mut walker = Walker { bundles, ..walker(&mut scratch) };
     assert_eq!(lane.take(scene, &mut walker, *ray, &mut record, &mut counts), None, "every page is at hand");
     let mut steps = 0;
     while !lane.is_empty() {
@@ -196,13 +211,13 @@ fn a_ledger_with_a_fault_stays_open() {
     }
     hall().with(|scene| {
         for ray in through_the_hall(100) {
-            let (mut sink, mut counts, mut stack) = (Faulty(ray.id, 0, [0; 2]), Counts::default(), Stack::new());
+            let (mut sink, mut counts, mut stack) = (Faulty(ray.id, 0, [0; 2]), Counts::default(), Room::default());
             let mut room = [HitRecord::EMPTY; 5];
             let (mut lane, mut walker) = (Lane::new(&mut room), walker(&mut stack));
             let mut known = ray;
             let hit = walker.nearest(scene, &mut known).expect("every page is at hand");
             assert_eq!((known.settled, known.page, known.t_max), (1, hit.page, hit.candidate.t));
-            lane.start(scene, &known, &hit, &mut sink, &mut counts);
+            begin(scene, &known, &hit, &mut sink, &mut counts).into_iter().for_each(|record| lane.push(record));
             while !lane.is_empty() {
                 assert_ne!(sink.0, 0, "not zero before the tree has ended");
                 assert_eq!(lane.step(scene, &mut walker, &mut sink, &mut counts), None);
@@ -214,20 +229,74 @@ fn a_ledger_with_a_fault_stays_open() {
     });
 }
 
+/// Hits that stand together, and samples of lights: no ray is sent twice, and none is left out.
+#[test]
+fn shadow_rays_together_bring_what_they_bring_singly() {
+    let (mut answered, mut asked) = (0, 0);
+    for world in [hall(), hall().opaque(), hall().softly_lit(), hall().softly_lit().opaque()] {
+        world.with(|scene| {
+            let (mut together, mut counts, mut scratch) = (Record::default(), Counts::default(), Room::default());
+            let mut walker = Walker { bundles: true, ..walker(&mut scratch) };
+            let (mut single, mut single_counts) = (Record::default(), Counts::default());
+            let mut records = Vec::new();
+            for mut ray in through_the_hall(400) {
+                if records.len() == TOGETHER {
+                    break;
+                }
+                let (record, counted) = trace_with(scene, &ray, 5, false);
+                single.contributions.extend(record.contributions);
+                single.entries = single.entries.wrapping_add(record.entries);
+                single_counts += counted;
+                let hit = walker.nearest(scene, &mut ray).expect("every page is at hand");
+                records.extend(begin(scene, &ray, &hit, &mut together, &mut counts));
+            }
+            assert_eq!(records.len(), TOGETHER);
+            let before = walker.ahead;
+            for cursor in (0..64).filter(|&cursor| goes_together(scene, cursor)) {
+                walker.shadows(scene, &mut records, cursor, &mut together, &mut counts);
+            }
+            answered += counts.shadow;
+            asked += walker.ahead - before;
+            let mut room = [HitRecord::EMPTY; 5];
+            let mut lane = Lane::new(&mut room);
+            for record in records {
+                lane.push(record);
+                while !lane.is_empty() {
+                    assert_eq!(lane.step(scene, &mut walker, &mut together, &mut counts), None);
+                }
+            }
+            assert_eq!((counts, together.entries), (single_counts, single.entries));
+            together.contributions.sort_unstable();
+            single.contributions.sort_unstable();
+            assert_eq!(together.contributions, single.contributions);
+        });
+    }
+    assert!(answered > 300 && asked > answered + 10, "{asked} asked, {answered} answered");
+}
+
+#[test]
+fn depth_first_finds_what_breadth_first_finds_under_soft_lights() {
+    for world in [hall().softly_lit(), hall().softly_lit().opaque()] {
+        world.with(|scene| depth_first_and_breadth_first(scene, 120));
+    }
+}
+
 #[test]
 fn depth_first_finds_what_breadth_first_finds() {
-    hall().with(|scene| {
-        let mut all = 0;
-        for ray in through_the_hall(400) {
-            let (mut record, _) = trace(scene, &ray, 5);
-            let mut expected = breadth_first(scene, &ray);
-            record.contributions.sort_unstable();
-            expected.sort_unstable();
-            assert_eq!(record.contributions, expected, "{ray:?}");
-            all += expected.len();
-        }
-        assert!(all > 1_500, "{all}");
-    });
+    hall().with(|scene| depth_first_and_breadth_first(scene, 400));
+}
+
+fn depth_first_and_breadth_first(scene: &Scene<'_>, rays: u32) {
+    let mut all = 0;
+    for ray in through_the_hall(rays) {
+        let (mut record, _) = trace(scene, &ray, 5);
+        let mut expected = breadth_first(scene, &ray);
+        record.contributions.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(record.contributions, expected, "{ray:?}");
+        all += expected.len();
+    }
+    assert!(all > 1_500, "{all}");
 }
 
 /// As many records as rays may be deep are enough, in a hall of mirrors too.
@@ -301,7 +370,7 @@ fn shadow(origin: Vec3, direction: Vec3, t_max: f32, weight: [f32; 3]) -> RayRec
 /// What of `[1, 0.5, 0.25]` arrives at the floor through the sheets.
 fn arriving(transmissions: &[[f32; 3]]) -> [f32; 3] {
     sheets(transmissions).with(|scene| {
-        let mut stack = Stack::new();
+        let mut stack = Room::default();
         let from = Vec3::new(-0.1, 0.5 / (transmissions.len() as f32 + 2.0), -0.3);
         let mut ray = shadow(from, Vec3::new(0.2, 3.0, 0.1) - from, 1.0, [1.0, 0.5, 0.25]);
         walker(&mut stack).arriving(scene, &mut ray).expect("every page is at hand")
@@ -341,7 +410,7 @@ fn shadows_of_a_glass_ball() {
     let ball = |y: f32, radius| Shape::Sphere(Sphere { centre: Vec3::Y * y, radius });
     let world = World::new(vec![(ball(1.0, 0.5), 0), (ball(3.0, 0.25), 1)], vec![glass, Material::MATT], vec![]);
     world.with(|scene| {
-        let mut stack = Stack::new();
+        let mut stack = Room::default();
         let mut up = |x: f32, t_max: f32| {
             let mut ray = shadow(Vec3::X * x, Vec3::Y * 2.0, t_max, [1.0; 3]);
             walker(&mut stack).arriving(scene, &mut ray).expect("every page is at hand")

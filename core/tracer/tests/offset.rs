@@ -7,7 +7,7 @@ use hybray_bintree::walk::Stack;
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Cone, Ray, RayKernel, Sphere, Triangle, Vec3};
 use hybray_shading::{Material, offset_origin};
-use hybray_tracer::{Walker, surface};
+use hybray_tracer::{Together, Walker, surface};
 use hybray_wire::RayRecord;
 use world::{Shape, World};
 
@@ -48,9 +48,8 @@ fn check(name: &str, rounds: usize, both_sides: bool, mut make: impl FnMut(&mut 
         let (shape, origin, target) = make(&mut random);
         let direction = (target - origin) / (target - origin).length();
         World::new(vec![(shape, 0)], vec![Material::MATT], vec![]).with(|scene| {
-            let mut stack = Stack::new();
-            let mut walker =
-                Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
+            let (mut stack, mut together) = (Stack::new(), Together::new());
+            let mut walker = Walker::new(Kernels::Portable, &mut stack, &mut together);
             let mut record = RayRecord {
                 origin: origin.to_array(),
                 direction: direction.to_array(),

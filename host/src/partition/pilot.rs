@@ -12,7 +12,7 @@ use hybray_scene::{PageView, Pages};
 use hybray_scheduler::DEPTH_MAX;
 use hybray_scheduler::policy::Policy;
 use hybray_shading::{Camera, id};
-use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker};
+use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Together, Walker};
 use hybray_wire::{Counts, Frame, RayKind, RayRecord, TileMap};
 use std::cell::RefCell;
 use std::num::NonZero;
@@ -97,9 +97,9 @@ impl Ahead<'_> {
         scene.shading.weight_cutoff = frame.weight_cutoff;
         let watched = Watched { pages: scene.resident.pages, opened: RefCell::default() };
         let scene = scene.at_hand(&watched);
-        let (mut stack, mut records) = (Stack::new(), vec![HitRecord::EMPTY; depth_max + 1]);
-        let mut walker =
-            Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
+        let (mut stack, mut together) = (Stack::new(), Together::new());
+        let mut records = vec![HitRecord::EMPTY; depth_max + 1];
+        let mut walker = Walker::new(Kernels::Portable, &mut stack, &mut together);
         let mut counts = Counts::default();
         let cost = |walker: &Walker<'_>, counts: &Counts| {
             let rays = counts.primary + counts.secondary + counts.shadow;

@@ -120,6 +120,10 @@ pub(super) struct WorkArgs {
     /// for all. Default: every node for itself
     #[arg(long, value_name = "N", help_heading = BUDGET)]
     pub subhosts: Option<u16>,
+    /// Whether shadow rays of hits that stand together, and those to the samples of an area light, are traced as bundles
+    /// (chapter 4). Default: on
+    #[arg(long, value_enum, help_heading = "Farm (none of these changes the picture)")]
+    pub shadow_bundles: Option<Switch>,
     /// Whether nodes that have nothing to do at the end of the picture are given some of the others' rays and
     /// tiles; never with --tiles static. Default: on
     #[arg(long, value_enum, help_heading = BUDGET)]
@@ -146,6 +150,7 @@ impl WorkArgs {
             granularity: self.granularity.unwrap_or(settings.granularity),
             in_system: self.in_system.unwrap_or(settings.in_system),
             bundle_tiles: self.pyramid.map_or(settings.bundle_tiles, |side| if side == 8 { 1 } else { 4 }),
+            shadow_bundles: self.shadow_bundles.map_or(settings.shadow_bundles, |on| matches!(on, Switch::On)),
             subhosts: self.subhosts.or(settings.subhosts),
             ..settings
         }

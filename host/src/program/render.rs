@@ -92,6 +92,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
             Where::Host => DispatcherAt::Host,
             Where::Node => DispatcherAt::Node,
         },
+        shadow_bundles: settings.shadow_bundles,
         options: args.work.options(args.spread, args.tile, &settings),
     };
 

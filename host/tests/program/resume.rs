@@ -54,8 +54,13 @@ fn keep(folder: &Folder, scene: &str, has: &dyn Fn(u32) -> bool, black: Option<u
     let wanted = Settings { size: Some(SIZE), spp: Some(2), ..Settings::default() };
     let frame = prepared.frame(&prepared.cameras[0], &wanted);
     let subject = prepared.subject(&pages, &frame);
-    let farm =
-        Farm { nodes: 1, kernels: Kernels::detect(), dispatcher: DispatcherAt::Host, options: Options::default() };
+    let farm = Farm {
+        nodes: 1,
+        kernels: Kernels::detect(),
+        dispatcher: DispatcherAt::Host,
+        shadow_bundles: true,
+        options: Options::default(),
+    };
     let mut cut = Cut { path: &folder.0.join("a.ppm.film"), subject, has, black };
     trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut cut).unwrap();
 }

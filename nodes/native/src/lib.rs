@@ -39,6 +39,8 @@ pub struct Farm {
     pub kernels: Kernels,
     /// Where tiles are given out.
     pub dispatcher: DispatcherAt,
+    /// Shadow rays are traced as bundles where they can be.
+    pub shadow_bundles: bool,
     /// T, the least run, and when nodes are given tiles: pixels can be counted at the host only.
     pub options: Options,
 }
@@ -98,7 +100,8 @@ pub fn trace(scene: &Scene<'_>, scene_hash: u64, frame: &Frame, farm: &Farm, wat
         let mut memory = room(bytes);
         let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
         let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
-        let node = Node::new(*scene, store, scene_hash, farm.kernels, peer, at, Settings::default(), memory);
+        let settings = Settings { shadow_bundles: farm.shadow_bundles, ..Settings::default() };
+        let node = Node::new(*scene, store, scene_hash, farm.kernels, peer, at, settings, memory);
         turn(node, link, dispatcher, clock)
     })
 }
@@ -144,7 +147,8 @@ pub fn trace_within(
         for &page in copies.into_iter().flatten() {
             assert!(cache.put(page, budget.pages[page as usize]), "page {page} is none");
         }
-        let settings = plan.settings(budget.settings);
+        let settings = Settings { shadow_bundles: farm.shadow_bundles, ..budget.settings };
+        let settings = plan.settings(settings);
         let node = Node::new(scene, cache, scene_hash, farm.kernels, peer, dispatcher_at(farm), settings, memory);
         turn(node, link, dispatcher, clock)
     }))

@@ -55,7 +55,7 @@ fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
 }
 
 fn farm(nodes: u16, dispatcher: DispatcherAt) -> Farm {
-    Farm { nodes, kernels: Kernels::Portable, dispatcher, options: Options::default() }
+    Farm { nodes, kernels: Kernels::Portable, dispatcher, shadow_bundles: true, options: Options::default() }
 }
 
 fn sky(nodes: u16, dispatcher: DispatcherAt, watch: impl FnMut(Progress) -> bool + Send + 'static) -> Traced {

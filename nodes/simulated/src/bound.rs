@@ -9,7 +9,7 @@ use crate::take::FRAMES;
 use hybray_link::Peer;
 use hybray_scene::DEPTH_MAX as LEVELS_MAX;
 use hybray_scheduler::{BUNDLE, DEPTH_MAX, FETCHES, PART_BYTES, Plan, REQUESTS_MAX, Settings};
-use hybray_tracer::{SHADOW_CHAIN_MAX, Scene};
+use hybray_tracer::{SHADOW_CHAIN_MAX, Scene, TOGETHER};
 use hybray_wire::{BODY_BYTES_MAX, HEAD_BYTES_MAX, Partial, RayRecord, TILE};
 
 /// What the longest time without a ray's end is made of. Virtual nanoseconds; no fault, no loss.
@@ -73,7 +73,9 @@ impl Bound {
         let network = machine.network(nodes);
         let room = u128::from(peers) * u128::from(network.room_frames.max(1));
         let quiet_ps = (FRAMES as u128 + room) * u128::from(frame_ps);
-        let step_ps = u128::from(settings.steps.max(1)) * walks.unit_ps + walks.bundle_ps + tiles_ps;
+        // The last unit may be a bundle of shadow rays.
+        let units = u128::from(settings.steps.max(1)) + TOGETHER as u128;
+        let step_ps = units * walks.unit_ps + walks.bundle_ps + tiles_ps;
 
         // Two lost parts of nanoseconds, and one that each turn takes at least.
         let turn_ns = |ps: u128| ps / 1000 + 3;
@@ -141,14 +143,15 @@ impl Walks {
             walk_ps,
             descent_ps: times(costs.cell, directory_nodes.min(LEVELS_MAX)),
             chain,
-            unit_ps: ray_ps + chain * walk_ps,
+            // A shadow ray may have gone along in a bundle before: its clip, and a walk.
+            unit_ps: ray_ps + (chain + 2) * walk_ps,
             bundle_ps: bundle * (u128::from(costs.ray) + 2 * walk_ps) + 2 * walk_ps,
             ray_ps,
         }
     }
 
-    /// A ray that goes through the whole scene, page by page, and its part of a bundle.
+    /// A ray that goes through the whole scene, page by page, and its part of two bundles.
     fn life_ps(&self, pages: u128) -> u128 {
-        self.ray_ps + 4 * self.walk_ps + self.chain * (self.walk_ps + pages * self.descent_ps)
+        self.ray_ps + 6 * self.walk_ps + self.chain * (self.walk_ps + pages * self.descent_ps)
     }
 }

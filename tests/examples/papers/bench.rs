@@ -54,6 +54,8 @@ pub struct Job {
     pub in_system: Option<u32>,
     /// Tiles of a pyramid, if it is not the default.
     pub bundle_tiles: Option<u8>,
+    /// Shadow rays are traced as bundles where they can be.
+    pub shadow_bundles: bool,
     /// When nodes are given tiles.
     pub tiles: Tiles,
     /// Which nodes are.
@@ -87,6 +89,7 @@ impl Job {
             granularity: None,
             in_system: None,
             bundle_tiles: None,
+            shadow_bundles: true,
             tiles: Tiles::Dynamic,
             criterion: Criterion::All,
             subhosts: None,
@@ -109,7 +112,7 @@ impl Job {
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
         let same = Self { tiles: Tiles::Dynamic, criterion: Criterion::All, take_over: true, ..self.clone() };
-        let same = Self { subhosts: None, pilot: PILOT_RAYS, ..same };
+        let same = Self { subhosts: None, pilot: PILOT_RAYS, shadow_bundles: true, ..same };
         Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..same }
     }
 }
@@ -315,6 +318,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
         granularity: job.granularity.unwrap_or(settings.granularity),
         in_system: job.in_system.unwrap_or(settings.in_system),
         bundle_tiles: job.bundle_tiles.unwrap_or(settings.bundle_tiles),
+        shadow_bundles: job.shadow_bundles,
         subhosts: job.subhosts,
         ..settings
     };

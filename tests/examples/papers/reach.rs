@@ -229,6 +229,7 @@ fn mechanism_rows(bench: &Bench, job: &Job, roomy: &Job, light_caches_fit: bool)
         ("nothing fetched: `data-parallel`", changed(&|job| job.policy = Policy::DataParallel)),
         ("nothing forwarded: `demand-driven`", changed(&|job| job.policy = Policy::DemandDriven)),
         ("pyramids of 8 x 8 pixels instead of 16 x 16", changed(&|job| job.bundle_tiles = Some(1))),
+        ("shadow rays one by one: no bundles from lights and from hits", changed(&|job| job.shadow_bundles = false)),
         ("tiles given out by a node instead of the host", changed(&|job| job.is_dispatched_by_node = true)),
         ("no pilot: owners by space, equal numbers of tiles, no copies", changed(&|job| job.pilot = 0)),
         ("a pilot of 1,024 rays, one a tile, instead of four", changed(&|job| job.pilot = 1024)),

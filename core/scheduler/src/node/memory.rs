@@ -9,8 +9,7 @@ use crate::server::{Asked, PageServer};
 use hybray_arena::{Arena, List, Ring, Short, Slab, Sum};
 use hybray_bintree::walk::{Hit, Stack, Walked};
 use hybray_geometry::{Ray, Vec3};
-use hybray_pyraclip::wide;
-use hybray_tracer::HitRecord;
+use hybray_tracer::{HitRecord, TOGETHER, Together};
 use hybray_wire::{Partial, RayRecord};
 
 /// Chosen limits: bytes follow from them.
@@ -36,12 +35,13 @@ impl Limits {
     }
 }
 
-/// A bundle of primary rays, and scratch of walks.
+/// A bundle of primary rays, hits of it whose shadow rays go together, and scratch of walks.
 pub(super) struct Bundle {
     pub rays: [Ray; BUNDLE],
     pub walked: [Walked; BUNDLE],
     pub places: [Place; BUNDLE],
-    pub scratch: wide::Scratch,
+    pub lit: [HitRecord; TOGETHER],
+    pub together: Together,
     pub stack: Stack,
 }
 
@@ -70,7 +70,8 @@ macro_rules! terms {
                 rays: [ray; BUNDLE],
                 walked: [Walked { best: Hit::none(0.0), needs: None }; BUNDLE],
                 places: [Place::default(); BUNDLE],
-                scratch: wide::Scratch::new(),
+                lit: [HitRecord::EMPTY; TOGETHER],
+                together: Together::new(),
                 stack: Stack::new(),
             }),
             $do!("hit records of the lane", HitRecord, DEPTH_MAX + 1, || HitRecord::EMPTY),

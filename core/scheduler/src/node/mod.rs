@@ -36,7 +36,7 @@ use hybray_link::{HOST, Link, Peer};
 use hybray_pyraclip::wide;
 use hybray_scene::Pages;
 use hybray_shading::{id, sample_offset};
-use hybray_tracer::{Lane, Scene, Walker};
+use hybray_tracer::{Lane, Scene, Walker, goes_together};
 use hybray_wire::{Counts, Message, RayKind, RayRecord, TILE, View};
 use memory::Bundle;
 use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
@@ -78,6 +78,8 @@ pub struct Settings {
     pub requests: u8,
     /// Shadow rays are tested against all pages at hand first, and what is left of them is forwarded: with light caches.
     pub lights_first: bool,
+    /// Shadow rays of hits that stand together, and those to the samples of an area light, are traced as bundles.
+    pub shadow_bundles: bool,
     /// Nodes that clip bundles for themselves and as many others (table 6.3); with none the host does, and every node does
     /// if nothing is said.
     pub subhosts: Option<Peer>,
@@ -96,6 +98,7 @@ impl Default for Settings {
             in_system: 4096,
             requests: 8,
             lights_first: false,
+            shadow_bundles: true,
             subhosts: None,
         }
     }
@@ -182,6 +185,17 @@ struct InWork {
     of_run: bool,
 }
 
+/// Hits of the bundle whose shadow rays are traced together: records that the lane takes over one by one.
+#[derive(Clone, Copy, Default)]
+struct Lit {
+    /// Records.
+    count: usize,
+    /// Shadow rays of each that had their turn.
+    cursor: u32,
+    /// Records that the lane has taken over; none before all shadow rays had their turn.
+    taken: usize,
+}
+
 /// A page that was asked for, or is to be.
 #[derive(Clone, Copy)]
 struct Request {
@@ -204,6 +218,7 @@ pub struct Node<'m, 's, P: Store> {
     runs: heapless::Deque<Run, RUNS>,
     in_work: InWork,
     stage: Stage,
+    lit: Lit,
     /// Records of the lane in use.
     depth: usize,
     /// The ray that the lane has in hand and the pool has no room for.
@@ -267,6 +282,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             runs: heapless::Deque::new(),
             in_work: InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false },
             stage: Stage::Idle,
+            lit: Lit::default(),
             depth: 0,
             aside: None,
             ahead: Ahead::new(subhost),
@@ -384,6 +400,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.done.clear();
         self.back = None;
         self.stage = Stage::Idle;
+        self.lit = Lit::default();
         (self.depth, self.aside) = (0, None);
         self.memory.tiles.fill(OpenTile::FREE);
         self.stopped = true;
@@ -438,10 +455,13 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         let Some(picture) = &self.picture else { return false };
         let frame = &picture.frame;
         let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, .. } = &mut self.memory;
-        let Bundle { rays, walked, places, scratch, stack } = &mut **bundle;
+        let Bundle { rays, walked, places, lit, together, stack } = &mut **bundle;
         let scene = self.scene.at_hand(&self.store);
-        let (kernels, past) = (self.kernels, self.settings.lights_first);
-        let mut walker = Walker { kernels, past, stack, counts: Default::default() };
+        let Settings { lights_first: past, shadow_bundles: bundles, .. } = self.settings;
+        let mut walker = Walker { past, bundles, ..Walker::new(self.kernels, stack, together) };
+        // As many as a bundle may have are lit at once; none where nothing would go together.
+        let shadows = scene.shading.shadow_rays.min(64);
+        let lit = if bundles && (0..shadows).any(|c| goes_together(&scene, c)) { &mut lit[..] } else { &mut [] };
         let mut lane = Lane::resume(lane, self.depth);
         let mut counts = Counts::default();
         let mut sums = Sums {
@@ -463,7 +483,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         };
         let mut units = 0;
         let mut bundles = 0;
-        while units < self.settings.steps {
+        while u64::from(units) + walker.ahead < u64::from(self.settings.steps) {
             // A unit adds to one pixel.
             if pool.capacity() > 0 && sums.partials.free() == 0 {
                 break;
@@ -501,6 +521,23 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 continue;
             }
             match self.stage {
+                Stage::Shading { next, end, .. }
+                    if self.lit.count > self.lit.taken && (next == end || self.lit.count == lit.len()) =>
+                {
+                    let Lit { count, cursor, taken } = &mut self.lit;
+                    if *cursor < shadows {
+                        if goes_together(&scene, *cursor) {
+                            walker.shadows(&scene, &mut lit[..*count], *cursor, &mut sums, &mut counts);
+                        }
+                        *cursor += 1;
+                        continue;
+                    }
+                    lane.push(lit[*taken]);
+                    *taken += 1;
+                    if taken == count {
+                        self.lit = Lit::default();
+                    }
+                }
                 Stage::Shading { sample, next, end } if next < end => {
                     let (place, went) = (&places[next], &walked[next]);
                     let tile = self.in_work.tiles[usize::from(place.tile)];
@@ -513,7 +550,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     };
                     match waits {
                         Some(ray) => self.aside = pool.push(ray, at_hand(&scene, ray.page)).err(),
-                        None => lane.start(&scene, &ray, &went.best, &mut sums, &mut counts),
+                        None => match hybray_tracer::begin(&scene, &ray, &went.best, &mut sums, &mut counts) {
+                            Some(record) if lit.is_empty() => lane.push(record),
+                            Some(record) => {
+                                lit[self.lit.count] = record;
+                                self.lit.count += 1;
+                            }
+                            None => {}
+                        },
                     }
                     self.stage = Stage::Shading { sample, next: next + 1, end };
                 }
@@ -525,7 +569,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     bundles += 1;
                     let count = self.in_work.rays;
                     start_sample(picture, sample + 1, &places[..count], &mut rays[..count]);
-                    trace_bundle(&scene, &rays[..count], walked, scratch, &mut walker);
+                    trace_bundle(&scene, &rays[..count], walked, &mut walker);
                     counts.primary += count as u64;
                     self.stage = Stage::Shading { sample: sample + 1, next: 0, end: count };
                 }
@@ -557,7 +601,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                         && let Some(next) = next
                     {
                         let kernels = self.kernels;
-                        self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
+                        self.ahead.look(
+                            picture,
+                            &self.scene,
+                            kernels,
+                            next,
+                            &mut walker.together.scratch,
+                            &mut walker.counts,
+                        );
                     }
                     // A bundle waits for its cliplist; a tile that is traced again has none.
                     let has_list = pool.capacity() == 0 || next.is_some_and(|next| self.ahead.has(next));
@@ -576,10 +627,17 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                         && let Some(next) = next
                     {
                         let kernels = self.kernels;
-                        self.ahead.look(picture, &self.scene, kernels, next, scratch, &mut walker.counts);
+                        self.ahead.look(
+                            picture,
+                            &self.scene,
+                            kernels,
+                            next,
+                            &mut walker.together.scratch,
+                            &mut walker.counts,
+                        );
                     }
                     start_sample(picture, 0, &places[..count], &mut rays[..count]);
-                    trace_bundle(&scene, &rays[..count], walked, scratch, &mut walker);
+                    trace_bundle(&scene, &rays[..count], walked, &mut walker);
                     counts.primary += count as u64;
                     self.stage = Stage::Shading { sample: 0, next: 0, end: count };
                 }
@@ -656,7 +714,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     fn clip(&mut self, link: &mut dyn Link) -> bool {
         let Self { picture, scene, kernels, memory, walk_counts, .. } = self;
         let Some(picture) = picture else { return false };
-        let scratch = &mut memory.bundle.scratch;
+        let scratch = &mut memory.bundle.together.scratch;
         memory.clips.serve(link, &picture.map, &mut |tiles| clip(picture, scene, *kernels, tiles, scratch, walk_counts))
     }
 
@@ -696,10 +754,10 @@ fn trace_bundle<P: Pages + ?Sized>(
     scene: &Scene<'_, P>,
     rays: &[Ray],
     walked: &mut [hybray_bintree::walk::Walked],
-    scratch: &mut wide::Scratch,
     walker: &mut Walker<'_>,
 ) {
     let (kernels, magnitude) = (walker.kernels, scene.magnitude);
+    let scratch = &mut walker.together.scratch;
     wide::nearest(kernels, &scene.resident, magnitude, rays, walked, scratch, walker.stack, &mut walker.counts);
 }
 

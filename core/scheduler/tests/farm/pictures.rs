@@ -6,7 +6,7 @@ use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray};
 use hybray_scheduler::{Fixed, Step};
 use hybray_shading::{Camera, Filter, id, sample_offset};
-use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Walker};
+use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Together, Walker};
 use hybray_wire::{Counts, Frame, RayRecord, TileMap};
 use std::sync::OnceLock;
 
@@ -48,9 +48,9 @@ impl Picture {
         let camera =
             Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height).unwrap();
         let filter = Filter::from_u32(u32::from(frame.filter)).unwrap();
-        let (mut stack, mut records) = (Stack::new(), vec![HitRecord::EMPTY; 64]);
-        let mut walker =
-            Walker { kernels: Kernels::Portable, past: false, stack: &mut stack, counts: Default::default() };
+        let (mut stack, mut together) = (Stack::new(), Together::new());
+        let mut records = vec![HitRecord::EMPTY; 64];
+        let mut walker = Walker::new(Kernels::Portable, &mut stack, &mut together);
         let mut counts = Counts::default();
         let mut sums = Vec::new();
         let mut rays = Vec::new();

@@ -160,6 +160,17 @@ pub fn full_hall() -> World {
 }
 
 impl World {
+    /// The same under lights with many samples: more than a bundle has room for, a few, and some between.
+    pub fn softly_lit(mut self) -> Self {
+        let colour = [0.7, 0.8, 0.9];
+        let square = Light { position: [-1.0, 1.8, -0.5], u: [0.0, 0.1, 1.0], v: [-1.0, 0.0, 0.0], ..Light::default() };
+        let sphere = Light { position: [0.5, 1.4, 1.0], colour, kind: 3, radius: 0.3, ..Light::default() };
+        self.lights.insert(1, Light { kind: 4, colour, samples: 100, ..square });
+        self.lights.push(Light { samples: 12, ..sphere });
+        self.lights.push(Light { samples: 7, ..sphere });
+        self
+    }
+
     /// The same with nothing that lets light through.
     pub fn opaque(mut self) -> Self {
         for material in &mut self.materials {
