@@ -51,6 +51,7 @@ impl Drawn {
                 nodes: 1,
                 kernels: kernels(),
                 dispatcher: DispatcherAt::Host,
+                shadow_bundles: false,
                 options: Options { spread: Some(1.0), atomic: None, ..Options::default() },
             };
             let frames = SIZES.map(|(size, samples, depth)| {

@@ -118,7 +118,7 @@ fn singly<const ANY: bool, S: Simd, P: Pages + ?Sized>(
     counts: &mut Counts,
 ) {
     for (ray, walked) in rays.iter().zip(walked) {
-        *walked = Walk::<ANY, P>::new(scene, ray, stack, counts).run(simd);
+        *walked = Walk::<ANY, P> { past: ANY, ..Walk::new(scene, ray, stack, counts) }.run(simd);
     }
 }
 

@@ -5,7 +5,7 @@ mod common;
 
 use common::scenes::{mixed, table};
 use common::{Random, Rule, Shapes, build};
-use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walked, occluded};
+use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk, Walked, occluded};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Ray, Vec3};
@@ -96,6 +96,9 @@ fn check(
                 let found = walked.best.candidate;
                 if let Some(page) = walked.needs {
                     assert!(!scene.pages.here[page as usize], "{what} {any} {ray:?}: page {page} is here");
+                    let (stack, counts) = (&mut stack, &mut counts);
+                    let all = Walk::<true, _> { past: true, ..Walk::new(scene, ray, stack, counts) };
+                    assert!(!any || !kernels.run(all).best.candidate.is_hit(), "{what} {ray:?}: it is blocked here");
                     totals.unknown += 1;
                 } else if any {
                     assert_eq!(found.is_hit(), expected.is_hit(), "{what} {kernels:?} {ray:?} {found:?} {expected:?}");
