@@ -7,8 +7,10 @@
 
 mod compare;
 mod hybray;
+mod kernels;
 mod pairs;
 mod pictures;
+mod plot;
 mod povray;
 mod scale;
 mod table;
@@ -22,6 +24,7 @@ use anyhow::Context as _;
 use clap::{Args, Subcommand};
 
 use self::hybray::Hybray;
+use self::kernels::Kernels;
 use self::table::Table;
 use crate::tools::Tools;
 use crate::workspace::Workspace;
@@ -35,6 +38,10 @@ pub enum Bench {
     Threads(threads::Options),
     /// A terrain of more and more triangles: times, bytes for each triangle, cost of a primary ray
     Scale(scale::Options),
+    /// Our kernels beside those of obvhs and Embree on the same rays: speeds, builds, bytes, counts, and what they ought to be
+    Kernels(kernels::Options),
+    /// What a primary ray costs by the number of triangles, and a line through it
+    Growth(kernels::GrowthOptions),
 }
 
 /// What every benchmark may be told.
@@ -68,6 +75,8 @@ pub fn run(bench: &Bench) -> anyhow::Result<ExitCode> {
         Bench::Pictures(options) => (&options.common, pictures::skip()),
         Bench::Threads(options) => (&options.common, None),
         Bench::Scale(options) => (&options.common, None),
+        Bench::Kernels(options) => (&options.common, None),
+        Bench::Growth(options) => (&options.common, None),
     };
     if let Some(why) = skip {
         println!("skipped: {why}");
@@ -78,12 +87,17 @@ pub fn run(bench: &Bench) -> anyhow::Result<ExitCode> {
     if let Some(note) = busy_note() {
         println!("{note}");
     }
-    let bed = Bed { hybray: Hybray::build(&tools, &workspace)?, folder: workspace.target.join("bench") };
-    fs::create_dir_all(&bed.folder).with_context(|| format!("{}: no folder can be made", bed.folder.display()))?;
+    let bed = || -> anyhow::Result<Bed> {
+        let bed = Bed { hybray: Hybray::build(&tools, &workspace)?, folder: workspace.target.join("bench") };
+        fs::create_dir_all(&bed.folder).with_context(|| format!("{}: no folder can be made", bed.folder.display()))?;
+        Ok(bed)
+    };
     let found = match bench {
-        Bench::Pictures(options) => pictures::run(&bed, options)?,
-        Bench::Threads(options) => threads::run(&bed, options)?,
-        Bench::Scale(options) => scale::run(&bed, options)?,
+        Bench::Pictures(options) => pictures::run(&bed()?, options)?,
+        Bench::Threads(options) => threads::run(&bed()?, options)?,
+        Bench::Scale(options) => scale::run(&bed()?, options)?,
+        Bench::Kernels(options) => kernels::run(&Kernels::build(&tools, &workspace)?, options)?,
+        Bench::Growth(options) => kernels::growth(&Kernels::build(&tools, &workspace)?, options)?,
     };
     println!("{}", found.table);
     if let Some(path) = &common.csv {

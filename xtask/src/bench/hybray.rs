@@ -127,7 +127,7 @@ pub fn pinned(program: &Path, processors: Option<u16>) -> Command {
 }
 
 /// Standard output of a command that has to succeed.
-fn output(mut command: Command) -> anyhow::Result<Vec<u8>> {
+pub fn output(mut command: Command) -> anyhow::Result<Vec<u8>> {
     let run = command.stdin(Stdio::null()).output();
     let run = run.with_context(|| format!("{} does not start", command.get_program().to_string_lossy()))?;
     let complaint = String::from_utf8_lossy(&run.stderr);

@@ -65,13 +65,14 @@ pub type Figures = Vec<(&'static str, Figure)>;
 #[derive(Default)]
 pub struct Table {
     /// At least one, and the same names in the same order for each.
-    scenes: Vec<Figures>,
+    scenes: Vec<Vec<(String, Figure)>>,
 }
 
 impl Table {
     /// Adds a scene, which must have the figures that the others have.
-    pub fn add(&mut self, figures: Figures) {
-        let names = |figures: &Figures| figures.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+    pub fn add<N: Into<String>>(&mut self, figures: Vec<(N, Figure)>) {
+        let figures: Vec<_> = figures.into_iter().map(|(name, figure)| (name.into(), figure)).collect();
+        let names = |figures: &[(String, Figure)]| figures.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
         let same = self.scenes.first().is_none_or(|first| names(first) == names(&figures));
         assert!(same, "{:?} do not fit the table", names(&figures));
         self.scenes.push(figures);

@@ -12,7 +12,7 @@ use crate::workspace::Member;
 type Rank = (u8, u8);
 
 /// Every crate's rank, by its folder. A new crate gets its line here.
-const RANKS: [(&str, Rank); 18] = [
+const RANKS: [(&str, Rank); 19] = [
     ("core/arena", (0, 0)),
     ("core/geometry", (0, 0)),
     ("core/scene", (1, 0)),
@@ -30,6 +30,7 @@ const RANKS: [(&str, Rank); 18] = [
     ("nodes/simulated", (7, 1)),
     ("host", (8, 0)),
     ("tests", (8, 1)),
+    ("tests/kernels", (8, 2)),
     ("xtask", (8, 1)),
 ];
 

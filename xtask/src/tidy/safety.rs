@@ -1,17 +1,18 @@
 //! Which crates run without an operating system, and where unsafe code may stand.
 //!
-//! Every crate forbids unsafe code. Two may deny it instead, and one module of theirs begins by lifting that; there every
-//! unsafe block says why it is sound.
+//! Every crate forbids unsafe code. Three may deny it instead, and one module of theirs begins by lifting that; there
+//! every unsafe block says why it is sound.
 
 use super::rust_text::{has_word, head_attributes, mask};
 use super::{Problem, tree::Tree};
 use crate::workspace::Member;
 
 const MISPLACED: &str =
-    "unsafe code outside the one module of geometry or arena that begins with `#![allow(unsafe_code)]`";
+    "unsafe code outside the one module of geometry, arena or tests/kernels that begins with `#![allow(unsafe_code)]`";
 
-/// The crates that may have one module with unsafe code: carving memory, and the processor's vectors.
-const MAY_HAVE_UNSAFE: [&str; 2] = ["core/arena", "core/geometry"];
+/// The crates that may have one module with unsafe code: carving memory, the processor's vectors, and a benchmark that calls
+/// another renderer.
+const MAY_HAVE_UNSAFE: [&str; 3] = ["core/arena", "core/geometry", "tests/kernels"];
 
 /// Refuses a root file without its attributes, unsafe code outside its one module, and unsafe blocks without a reason.
 pub fn check(tree: &Tree, crates: &[Member]) -> Vec<Problem> {

@@ -1,0 +1,111 @@
+//! Our kernels: the walk of one ray, and bundles of 256.
+
+use hybray_bintree::walk::{self, Hit, Resident, Stack, Walked};
+use hybray_geometry::Ray;
+use hybray_geometry::simd::Kernels;
+use hybray_pyraclip::wide;
+use hybray_scene::WIDTH;
+
+use crate::engine::{Answer, Counts, Engine, Kind};
+
+/// What both forms need.
+struct Walker<'a> {
+    scene: Resident<'a>,
+    kernels: Kernels,
+    stack: Stack,
+    counts: walk::Counts,
+}
+
+impl<'a> Walker<'a> {
+    fn new(scene: Resident<'a>) -> Self {
+        let kernels = hybray_tests::kernels();
+        Self { scene, kernels, stack: Stack::new(), counts: walk::Counts::default() }
+    }
+
+    fn told(&mut self) -> Counts {
+        let walk::Counts { nodes, blocks, pages, .. } = std::mem::take(&mut self.counts);
+        Counts { boxes: Some(nodes * WIDTH as u64), tests: blocks, pages: Some(pages) }
+    }
+}
+
+fn answer(hit: &Hit) -> Answer {
+    let candidate = hit.candidate;
+    if candidate.is_hit() { Answer { t: candidate.t, id: candidate.id } } else { Answer::MISS }
+}
+
+/// One ray after another.
+pub struct Single<'a>(Walker<'a>);
+
+impl<'a> Single<'a> {
+    /// Over pages that are all at hand.
+    pub fn new(scene: Resident<'a>) -> Self {
+        Self(Walker::new(scene))
+    }
+}
+
+impl Engine for Single<'_> {
+    fn name(&self) -> &'static str {
+        "hybray single"
+    }
+
+    fn trace(&mut self, kind: Kind, rays: &[Ray], out: &mut [Answer]) -> bool {
+        let Walker { scene, kernels, stack, counts } = &mut self.0;
+        for (ray, out) in rays.iter().zip(out) {
+            *out = if !kind.is_any() {
+                answer(&walk::nearest(*kernels, scene, ray, stack, counts))
+            } else if walk::occluded(*kernels, scene, ray, stack, counts) {
+                Answer::BLOCKED
+            } else {
+                Answer::MISS
+            };
+        }
+        true
+    }
+
+    fn counts(&mut self, kind: Kind, rays: &[Ray]) -> Option<Counts> {
+        self.0.counts = walk::Counts::default();
+        self.trace(kind, rays, &mut vec![Answer::MISS; rays.len()]).then(|| self.0.told())
+    }
+}
+
+/// 256 rays at a time.
+pub struct Bundles<'a> {
+    walker: Walker<'a>,
+    magnitude: f32,
+    scratch: wide::Scratch,
+    walked: Vec<Walked>,
+}
+
+impl<'a> Bundles<'a> {
+    /// Over pages that are all at hand, with no coordinate beyond `magnitude`.
+    pub fn new(scene: Resident<'a>, magnitude: f32) -> Self {
+        let walked = vec![Walked { best: Hit::none(0.0), needs: None }; wide::RAYS_MAX];
+        Self { walker: Walker::new(scene), magnitude, scratch: wide::Scratch::new(), walked }
+    }
+}
+
+impl Engine for Bundles<'_> {
+    fn name(&self) -> &'static str {
+        "hybray bundles"
+    }
+
+    fn trace(&mut self, kind: Kind, rays: &[Ray], out: &mut [Answer]) -> bool {
+        if kind.is_any() {
+            return false;
+        }
+        let Walker { scene, kernels, stack, counts } = &mut self.walker;
+        let (scratch, walked) = (&mut self.scratch, &mut self.walked);
+        for (rays, out) in rays.chunks(wide::RAYS_MAX).zip(out.chunks_mut(wide::RAYS_MAX)) {
+            wide::nearest(*kernels, scene, self.magnitude, rays, walked, scratch, stack, counts);
+            for (out, walked) in out.iter_mut().zip(&*walked) {
+                *out = answer(&walked.best);
+            }
+        }
+        true
+    }
+
+    fn counts(&mut self, kind: Kind, rays: &[Ray]) -> Option<Counts> {
+        self.walker.counts = walk::Counts::default();
+        self.trace(kind, rays, &mut vec![Answer::MISS; rays.len()]).then(|| self.walker.told())
+    }
+}
