@@ -1,4 +1,5 @@
-//! Looks for Embree's header and compiles the adaptor where it is: then the program has the engine, else it does without.
+//! Looks for Embree's header and compiles the adaptor where it is: then the program has the engine, else it does
+//! without.
 
 use std::path::Path;
 

@@ -38,7 +38,8 @@ pub enum Bench {
     Threads(threads::Options),
     /// A terrain of more and more triangles: times, bytes for each triangle, cost of a primary ray
     Scale(scale::Options),
-    /// Our kernels beside those of obvhs and Embree on the same rays: speeds, builds, bytes, counts, and what they ought to be
+    /// Our kernels beside those of obvhs and Embree on the same rays: speeds, builds, bytes, counts, and what they
+    /// ought to be
     Kernels(kernels::Options),
     /// What a primary ray costs by the number of triangles, and a line through it
     Growth(kernels::GrowthOptions),

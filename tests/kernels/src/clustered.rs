@@ -1,7 +1,7 @@
 //! The crate `obvhs`: its eight-wide compressed tree and its binary one, both clustered bottom-up.
 //!
-//! Primitives are stored in the order of the tree, in the form that the crate's own examples use for speed. Of spheres the
-//! crate knows nothing: the test here is that of *Ray Tracing Gems*, chapter 7, as ours is.
+//! Primitives are stored in the order of the tree, in the form that the crate's own examples use for speed. Of spheres
+//! the crate knows nothing: the test here is that of *Ray Tracing Gems*, chapter 7, as ours is.
 
 use std::time::{Duration, Instant};
 
@@ -256,8 +256,8 @@ impl Form {
     }
 }
 
-/// Builds a tree with `preset`. What is measured is the crate's build and the copy of primitives in its order. The compressed
-/// tree is built with room for a node a primitive, which is given back.
+/// Builds a tree with `preset`. What is measured is the crate's build and the copy of primitives in its order. The
+/// compressed tree is built with room for a node a primitive, which is given back.
 pub fn build(given: &Given, form: Form, (preset, params): (&str, BvhBuildParams)) -> (Box<dyn Engine>, Built) {
     let none = &mut Duration::default();
     let name = form.name();

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::engine::{Answer, Engine, Kind};
 
-/// What two answers may be apart, and a ray from an edge that it may be taken to miss: this many units in the last place of the
-/// greatest coordinate.
+/// What two answers may be apart, and a ray from an edge that it may be taken to miss: this many units in the last
+/// place of the greatest coordinate.
 const ULPS: f64 = 64.0;
 
 /// How many rays got another answer than from our single walk, by what explains it.
@@ -48,7 +48,8 @@ enum Why {
 }
 
 impl Comparison<'_> {
-    /// What is different. Where any hit will do, both engines are asked for the nearest of those rays about which they disagree.
+    /// What is different. Where any hit will do, both engines are asked for the nearest of those rays about which they
+    /// disagree.
     pub fn differences(
         &self,
         kind: Kind,

@@ -128,9 +128,9 @@ struct Embree {
 /// Builds a tree and returns the three forms that trace in it. `None` if there is no device.
 pub fn build(given: &Rc<Given>) -> Option<(Vec<Box<dyn Engine>>, Built)> {
     let (tree, mut built) = Built::of("embree", || {
-        // SAFETY: the pointers are those of slices with the lengths beside them, three indices a triangle, each below the
-        // number of vertices, with one float more than there are vertices; `Tree` keeps them alive, and a vector's heap
-        // block does not move when its owner does.
+        // SAFETY: the pointers are those of slices with the lengths beside them, three indices a triangle, each below
+        // the number of vertices, with one float more than there are vertices; `Tree` keeps them alive, and a vector's
+        // heap block does not move when its owner does.
         let tree = unsafe {
             hybray_embree_new(
                 given.vertices.as_ptr(),

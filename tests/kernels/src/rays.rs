@@ -13,8 +13,9 @@ use crate::engine::Kind;
 /// Of the bounce rays' directions.
 const SEED: u64 = 4;
 
-/// Primary rays of the first camera along Morton's curve, so that 256 of them are a square of 16 pixels; from their hits, in
-/// the same order, a shadow ray where the surface faces the light, and a bounce ray. All start where our tracer's would.
+/// Primary rays of the first camera along Morton's curve, so that 256 of them are a square of 16 pixels; from their
+/// hits, in the same order, a shadow ray where the surface faces the light, and a bounce ray. All start where our
+/// tracer's would.
 pub fn sets(prepared: &Prepared, scene: &Scene<'_>, primary: Vec<Ray>) -> Vec<(Kind, Vec<Ray>)> {
     let light = [light(prepared, scene)];
     // Without materials every surface is matt.
@@ -58,8 +59,8 @@ fn record(ray: &Ray) -> RayRecord {
     }
 }
 
-/// A ray from `place`, with a cosine distribution around the normal on the side from which it is seen: a point of the unit
-/// sphere around the normal's tip.
+/// A ray from `place`, with a cosine distribution around the normal on the side from which it is seen: a point of the
+/// unit sphere around the normal's tip.
 fn bounced(place: &Surface, random: &mut Random) -> Ray {
     let normal = place.geometric_normal;
     let normal = if normal.dot(place.incoming) > 0.0 { -normal } else { normal };

@@ -1,8 +1,8 @@
 //! `cargo xtask bench kernels`: our kernels beside those of `obvhs` and Embree.
 //!
-//! The rays are traced by the program `hybray-kernels` (`tests/kernels`), which is run for each scene and whose JSON is read. What it ought
-//! to come to stands in [`FLOORS`]; the table says beside each ratio whether it does. Clocks fail nothing; answers that
-//! nobody can explain do.
+//! The rays are traced by the program `hybray-kernels` (`tests/kernels`), which is run for each scene and whose JSON is
+//! read. What it ought to come to stands in [`FLOORS`]; the table says beside each ratio whether it does. Clocks fail
+//! nothing; answers that nobody can explain do.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -119,6 +119,7 @@ struct Report {
     primitives: u64,
     triangles: u64,
     pages: u64,
+    page_bytes: u64,
     kernels: String,
     embree: Option<u32>,
     builds: Vec<Built>,
@@ -266,6 +267,7 @@ fn wrong(report: &Report) -> Vec<String> {
 fn figures(report: &Report, class: Class) -> Vec<(String, Figure)> {
     let dash = || Figure::Text("-".to_owned());
     let text = |text: Option<String>| text.map_or_else(dash, Figure::Text);
+    let spread = |spread: Option<Spread>| Figure::Spread(spread.unwrap_or(Spread::of([])));
     let embree = report.embree.map(|v| format!("{}.{}.{}", v / 10_000, v / 100 % 100, v % 100));
     let mut rows: Vec<(String, Figure)> = vec![
         ("scene".to_owned(), report.scene.clone().into()),
@@ -279,14 +281,13 @@ fn figures(report: &Report, class: Class) -> Vec<(String, Figure)> {
         rows.push((format!("{kind} rays"), text(set.map(|set| set.rays.to_string()))));
         rows.push((format!("{kind} rays that hit"), text(set.map(|set| set.hits.to_string()))));
         for engine in ENGINES {
-            let speed = report.speed(kind, engine).map(Figure::Spread);
-            rows.push((format!("{kind}, {engine}, Mrays/s"), speed.unwrap_or_else(dash)));
+            rows.push((format!("{kind}, {engine}, Mrays/s"), spread(report.speed(kind, engine))));
         }
         for floor in FLOORS.iter().filter(|floor| floor.kind == kind) {
             let ratio = report.ratio(kind, floor.ours, floor.theirs);
             let name = format!("{kind}, {} / {}", floor.ours, floor.theirs);
             let verdict = ratio.zip((floor.least)(class)).map(|(ratio, least)| at_least(ratio.median, least));
-            rows.push((name.clone(), ratio.map_or_else(dash, Figure::Spread)));
+            rows.push((name.clone(), spread(ratio)));
             rows.push((format!("{name}, floor"), text(verdict)));
         }
         for engine in ENGINES {
@@ -310,8 +311,8 @@ fn figures(report: &Report, class: Class) -> Vec<(String, Figure)> {
     }
     for tree in TREES {
         let built = report.built(tree);
-        let seconds = built.map(|built| Spread::of(built.seconds.iter().copied()).into());
-        rows.push((format!("build, {tree}, s"), seconds.unwrap_or_else(dash)));
+        let seconds = built.map(|built| Spread::of(built.seconds.iter().copied()));
+        rows.push((format!("build, {tree}, s"), spread(seconds)));
         let bytes = built.map(|built| {
             let each = |bytes: u64| bytes as f64 / report.primitives as f64;
             format!("{:.1}, {:.1}", each(built.kept_bytes), each(built.peak_bytes))
@@ -325,6 +326,8 @@ fn figures(report: &Report, class: Class) -> Vec<(String, Figure)> {
     let ours = report.built("hybray").filter(|_| class != Class::Spheres);
     let bytes =
         |bytes: Option<u64>, most: f64| text(bytes.map(|bytes| at_most(bytes as f64 / report.triangles as f64, most)));
+    let pages = ours.map(|_| report.page_bytes);
+    rows.push(("bytes a triangle in pages and directory".to_owned(), bytes(pages, BYTES_MOST[0])));
     rows.push(("bytes a triangle kept".to_owned(), bytes(ours.map(|built| built.kept_bytes), BYTES_MOST[0])));
     rows.push(("bytes a triangle at the peak".to_owned(), bytes(ours.map(|built| built.peak_bytes), BYTES_MOST[1])));
     rows
@@ -340,7 +343,8 @@ fn at_most(value: f64, most: f64) -> String {
     format!("{value:.2} of {most} at most: {verdict}")
 }
 
-/// Traces the primary rays of a terrain of more and more triangles, and fits what one costs to `a + b log10(triangles)`.
+/// Traces the primary rays of a terrain of more and more triangles, and fits what one costs to `a + b
+/// log10(triangles)`.
 pub fn growth(kernels: &Kernels, options: &GrowthOptions) -> anyhow::Result<Found> {
     let (sizes, side): (&[u32], u32) = if options.common.small {
         (&[100, 1_000, 10_000], 64)
@@ -402,7 +406,7 @@ mod tests {
     use super::*;
 
     /// A scene with round figures: 100 rays of each kind.
-    const RECORDED: &str = r#"{ "scene": "x", "primitives": 10, "triangles": 10, "pages": 1, "kernels": "avx2", "embree": 31305,
+    const RECORDED: &str = r#"{ "scene": "x", "primitives": 10, "triangles": 10, "pages": 1, "page_bytes": 600, "kernels": "avx2", "embree": 31305,
         "builds": [
             { "name": "hybray", "seconds": [1.0, 3.0, 2.0], "kept_bytes": 640, "peak_bytes": 1501 },
             { "name": "obvhs CWBVH, medium", "seconds": [1.0], "kept_bytes": 1, "peak_bytes": 2 } ],
@@ -433,6 +437,7 @@ mod tests {
         assert_eq!(row(&rows, "primary, obvhs CWBVH, boxes, tests, pages a ray"), "4.00, 0.07, -");
         assert_eq!(row(&rows, "primary, obvhs CWBVH, ties, edges, ends, lost, unexplained"), "1, 2, 3, 4, 0");
         assert_eq!(row(&rows, "build, hybray / obvhs CWBVH, medium"), "2.00 of 2 at most: kept");
+        assert_eq!(row(&rows, "bytes a triangle in pages and directory"), "60.00 of 64 at most: kept");
         assert_eq!(row(&rows, "bytes a triangle kept"), "64.00 of 64 at most: kept");
         assert_eq!(row(&rows, "bytes a triangle at the peak"), "150.10 of 150 at most: passed");
         assert_eq!(row(&rows, "shadow, hybray single, Mrays/s"), "-");

@@ -10,7 +10,7 @@ use super::pairs::Spread;
 pub enum Figure {
     /// As it is to be read.
     Text(String),
-    /// Middle and ends; three fields of CSV.
+    /// Middle and ends; three fields of CSV. Of no figures at all, a dash, and three empty fields.
     Spread(Spread),
 }
 
@@ -36,6 +36,7 @@ impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Text(text) => f.write_str(text),
+            Self::Spread(spread) if spread.median.is_nan() => f.write_str("-"),
             Self::Spread(spread) => write!(f, "{spread}"),
         }
     }
@@ -45,6 +46,7 @@ impl Figure {
     fn fields(&self) -> Vec<String> {
         match self {
             Self::Text(text) => vec![text.clone()],
+            Self::Spread(s) if s.median.is_nan() => vec![String::new(); 3],
             Self::Spread(s) => [s.median, s.least, s.greatest].iter().map(f64::to_string).collect(),
         }
     }
@@ -142,6 +144,18 @@ balls,7,1.5,1,4
 \"a, \"\"b\"\"\",7,10.25,10,11
 ";
         assert_eq!(table().csv(), expected);
+    }
+
+    #[test]
+    fn missing_figures_keep_their_places() {
+        let mut table = Table::default();
+        for (scene, seconds) in [("a", &[1.5][..]), ("b", &[])] {
+            let trace = Spread::of(seconds.iter().copied());
+            table.add(vec![("scene", scene.to_owned().into()), ("trace, s", trace.into()), ("rays", 7.into())]);
+        }
+        let expected = "scene,\"trace, s\",\"trace, s least\",\"trace, s greatest\",rays\na,1.5,1.5,1.5,7\nb,,,,7\n";
+        assert_eq!(table.csv(), expected);
+        assert!(table.to_string().contains("trace, s  1.500 (1.500 to 1.500)  -\n"), "{table}");
     }
 
     #[test]
