@@ -6,7 +6,7 @@ use hybray_geometry::Ray;
 use serde::Serialize;
 
 /// Rays of one kind. The first is a picture's, in squares of 16 pixels; the others start where these hit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// The nearest hit of rays through pixels.

@@ -43,6 +43,9 @@ struct Args {
     /// How often each engine's tree is built
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     builds: u32,
+    /// Only rays of these kinds: for a profiler
+    #[arg(long, value_name = "KIND,..", value_delimiter = ',')]
+    kinds: Vec<Kind>,
     /// Leave out the other engines
     #[arg(long)]
     alone: bool,
@@ -153,7 +156,8 @@ fn report(args: &Args) -> anyhow::Result<Report> {
     }
 
     let comparison = Comparison { source: &source, magnitude: prepared.packed.magnitude };
-    let sets = sets.iter().map(|(kind, rays)| traced(*kind, rays, &mut engines, &comparison, args.rounds)).collect();
+    let wanted = sets.iter().filter(|(kind, _)| args.kinds.is_empty() || args.kinds.contains(kind));
+    let sets = wanted.map(|(kind, rays)| traced(*kind, rays, &mut engines, &comparison, args.rounds)).collect();
     Ok(Report {
         scene: args.scene.clone(),
         primitives: source.len(),
@@ -240,7 +244,7 @@ mod tests {
 
     /// A picture so small that it takes a moment: whether everything runs and agrees, not how long it takes.
     fn check(scene: &str) -> Report {
-        let args = Args { scene: scene.to_owned(), side: 32, rounds: 1, builds: 1, alone: false };
+        let args = Args { scene: scene.to_owned(), side: 32, rounds: 1, builds: 1, kinds: Vec::new(), alone: false };
         let report = report(&args).unwrap();
         let kinds: Vec<_> = report.sets.iter().map(|set| set.kind).collect();
         assert_eq!(kinds, [Kind::Primary, Kind::Shadow, Kind::Bounce]);
