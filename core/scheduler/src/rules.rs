@@ -68,17 +68,19 @@ pub const fn frees(taken: bool) -> bool {
     taken
 }
 
-/// Whether rays go to the owner of their page once more, though it had no room the last time: if the page has no place here
-/// either.
+/// Whether rays for whose page there is no place go to its owner, though it had no room for others the last time: unless
+/// they `moved` since their last page, be it in vain.
 #[must_use]
-pub const fn goes_again(has_place: bool, owner_is_full: bool, owner_traces: bool) -> bool {
-    !has_place && owner_is_full && owner_traces
+pub const fn goes_again(moved: bool, owner_is_full: bool, owner_traces: bool) -> bool {
+    !moved && owner_is_full && owner_traces
 }
 
-/// Whether the lane stands still until its page has come.
+/// Whether the lane stands still until the page of the ray in hand has come. There was no room for that ray in the pool:
+/// it is finished on the spot, though room came meanwhile. So each ray that the lane stands still for ends, or is a record
+/// of the lane, which gets no shallower before a ray ends.
 #[must_use]
-pub const fn lane_waits(at_hand: bool, pool_free: usize) -> bool {
-    !at_hand && pool_free == 0
+pub const fn lane_waits(at_hand: bool) -> bool {
+    !at_hand
 }
 
 /// Whether a new bundle may be begun: old work is finished first.

@@ -11,7 +11,6 @@ use crate::simulate::runs::{name_of, seconds};
 use anyhow::Result;
 use hybray_scheduler::Sizes;
 use hybray_simulated::{Bound, NODES_MAX};
-use hybray_wire::TileMap;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -54,6 +53,7 @@ struct Progress {
     wait_seconds: f64,
     rays: u128,
     steps: u128,
+    rounds: u128,
     tracing_seconds: f64,
     gap_seconds: f64,
 }
@@ -71,6 +71,7 @@ impl Bounds {
             wait_seconds: seconds(b.wait_ns),
             rays: b.rays,
             steps: b.steps,
+            rounds: b.rounds,
             tracing_seconds: seconds(b.tracing_ns),
             gap_seconds: seconds(b.gap_ns),
         }
@@ -93,8 +94,8 @@ impl Bounds {
             text += &format!("{seconds:>16.6} s  {what}\n");
         }
         text + &format!(
-            "{:>16}    rays under way, and {} steps that they can come on before one ends\n",
-            p.rays, p.steps
+            "{:>16}    rays under way at most; one comes on {} times, and waits for {} answers, before it ends\n",
+            p.rays, p.steps, p.rounds
         )
     }
 }
@@ -123,9 +124,11 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let fit = farm.fit(&prepared, &scene)?;
     let least = farm.least(&scene);
     let progress = args.machine.map(|machine| {
-        let tiles = TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
         let settings = fit.plan.settings(machine.settings(args.scheduler));
-        Bounds { machine: machine.name, bound: Bound::new(&scene, &fit.plan, &settings, machine, args.nodes, tiles, 0) }
+        Bounds {
+            machine: machine.name,
+            bound: Bound::new(&scene, &fit.plan, &settings, machine, args.nodes, &frame, 0),
+        }
     });
     let report = Report {
         scene: &args.scene.scene,

@@ -47,7 +47,7 @@ fn table(report: &Report) -> String {
     let mut out = String::from(
         "<div class=\"scroll\"><table><thead><tr><th>Nodes</th><th class=\"name\">Scheduler</th><th>Time</th><th>Speed-up</th>\
          <th>Efficiency</th><th>Busy (eq. 6.2)</th><th>Loading</th><th>Gathering</th>\
-         <th>Longest without a ray's end</th><th>at most</th><th>Messages</th><th>Bytes</th>\
+         <th>Longest without a ray's end</th><th>proved: at most</th><th>Messages</th><th>Bytes</th>\
          <th>Memory</th><th>Rays</th><th>Forwarded</th></tr></thead><tbody>\n",
     );
     for (i, run) in report.runs.iter().enumerate() {

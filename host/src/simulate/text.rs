@@ -77,7 +77,8 @@ impl Quantity {
         let steps: &[(f64, &str)] = match self {
             Self::Count => &[(1e9, "billions"), (1e6, "millions"), (2e4, "thousands")],
             Self::Bytes => &[(1073741824.0, "GiB"), (1048576.0, "MiB"), (1024.0, "KiB")],
-            Self::Seconds => &[(1.0, "s"), (1e-3, "ms")],
+            // A bound may be days or years.
+            Self::Seconds => &[(31_557_600.0, "years"), (86_400.0, "days"), (3600.0, "h"), (1.0, "s"), (1e-3, "ms")],
             Self::Share | Self::Ratio => &[],
         };
         let smallest = match self {
@@ -143,6 +144,9 @@ mod tests {
         assert_eq!(Quantity::Bytes.show(33554432.0), "32.0\u{a0}MiB");
         assert_eq!(Quantity::Bytes.show(12.0), "12.0 B");
         assert_eq!(Quantity::Seconds.show(0.00025), "250\u{a0}µs");
+        assert_eq!(Quantity::Seconds.show(3599.0), "3599\u{a0}s");
+        assert_eq!(Quantity::Seconds.show(5400.0), "1.50\u{a0}h");
+        assert_eq!(Quantity::Seconds.show(4.48e8), "14.2\u{a0}years");
         assert_eq!(Quantity::Share.show(0.8), "80.0\u{a0}%");
         assert_eq!(Quantity::Ratio.show(31.5), "31.5");
         assert_eq!(shorten("abcdef", 4), "abc…");

@@ -10,7 +10,7 @@ use hybray_link::Peer;
 use hybray_scene::DEPTH_MAX as LEVELS_MAX;
 use hybray_scheduler::{BUNDLE, DEPTH_MAX, FETCHES, PART_BYTES, Plan, REQUESTS_MAX, Settings};
 use hybray_tracer::{SHADOW_CHAIN_MAX, Scene, TOGETHER};
-use hybray_wire::{BODY_BYTES_MAX, HEAD_BYTES_MAX, Partial, RayRecord, TILE};
+use hybray_wire::{BODY_BYTES_MAX, Frame, HEAD_BYTES_MAX, Partial, RayRecord, TILE, TileMap};
 
 /// What the longest time without a ray's end is made of. Virtual nanoseconds; no fault, no loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,17 +29,19 @@ pub struct Bound {
     pub wait_ns: u128,
     /// Rays that may be under way at one time, in all nodes.
     pub rays: u128,
-    /// Times that one of them can come on before one must end.
+    /// Times that one ray can come on before it ends.
     pub steps: u128,
+    /// Rounds that it waits for at most, one after the other, or a ray that ends before it.
+    pub rounds: u128,
     /// Of the time without an end, that in which somebody traces.
     pub tracing_ns: u128,
-    /// The whole of it: `tracing_ns`, and for each step the longest wait.
+    /// The whole of it: `wait_ns` until there is a ray, `rounds` without tracing, and `tracing_ns`.
     pub gap_ns: u128,
 }
 
 impl Bound {
-    /// That of `nodes` nodes of this plan on a machine, for a picture of so many tiles. `scene` has all pages;
-    /// `delay_ns` is what chance may add to the way of a frame.
+    /// That of `nodes` nodes of this plan on a machine, for the picture of `frame`. `scene` has all pages; `delay_ns` is what
+    /// chance may add to the way of a frame.
     #[must_use]
     pub fn new(
         scene: &Scene<'_>,
@@ -47,13 +49,14 @@ impl Bound {
         settings: &Settings,
         machine: &Machine,
         nodes: Peer,
-        tiles: u32,
+        frame: &Frame,
         delay_ns: u64,
     ) -> Self {
         let (costs, limits) = (&machine.costs, &plan.limits);
         let per_node = limits.rays + DEPTH_MAX + 2 + BUNDLE;
         let rays = u128::from(nodes) * per_node as u128;
         let walks = Walks::of(scene, costs);
+        let tiles = TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
         let tiles_ps = u128::from(costs.tile) * u128::from(tiles);
 
         // A turn. Frames are as large as what they carry lets them be.
@@ -88,10 +91,22 @@ impl Bound {
         let quiet_round_ns = round_ns(turn_ns(quiet_ps));
         // A node that has every page waits for none. A ray that has its hit may wait for that page once more.
         let pages = if plan.holds_all { 0 } else { limits.pages as u128 };
-        let steps = rays * (3 * (pages + 1) * walks.chain + 2) + 1;
-        // Every page that is asked for has a place, and a peer is asked for so many at a time.
-        let asks = (REQUESTS_MAX + 1).min(plan.places).div_ceil(FETCHES).max(1) as u128;
-        let wait_ns = (2 * asks + 1) * quiet_round_ns;
+        let steps = (pages + 1) * walks.chain + 1;
+        // Pages that are asked for have places, and a peer is asked for so many at a time; the lane's goes before the others.
+        let open = usize::from(settings.requests).clamp(1, REQUESTS_MAX).min(plan.places.saturating_sub(1)).max(1);
+        let asks = (open + 1).div_ceil(FETCHES) as u128;
+        let wait_ns = (asks + 2) * quiet_round_ns;
+        // A page behind all others that may be wanted, and rays at the end of a full outbox. Each twice a step, and two ways
+        // until there is room for a sum.
+        let wanted = limits.pages.min(limits.rays);
+        let turn = (wanted.div_ceil(open) as u128 + 1) * asks;
+        let sent =
+            limits.rays.div_ceil(usize::from(settings.granularity).clamp(1, BODY_BYTES_MAX / size_of::<RayRecord>()));
+        let sums = limits.partials.clamp(1, BODY_BYTES_MAX / size_of::<Partial>()) as u128;
+        let in_pool = steps * (2 * turn + 2 * sent as u128 + 1) + rays.div_ceil(sums);
+        // The lane stands still: a round until its page can be asked for, and one until it comes.
+        let in_lane = (u128::from(frame.depth_max) + 1) * steps * 2;
+        let rounds = if pages == 0 { 1 } else { in_pool + in_lane };
         let tracing_ns = (rays * walks.life_ps(pages) + tiles_ps) / 1000 + steps;
         Self {
             walk_ns: walks.walk_ps / 1000 + 1,
@@ -102,8 +117,9 @@ impl Bound {
             wait_ns,
             rays,
             steps,
+            rounds,
             tracing_ns,
-            gap_ns: tracing_ns + steps * wait_ns,
+            gap_ns: wait_ns + rounds * quiet_round_ns + tracing_ns,
         }
     }
 }

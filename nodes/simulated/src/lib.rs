@@ -247,7 +247,7 @@ pub fn simulate_spoiled(
     let mut world = world::World::new(farm, plan, master, &mut states, clipper, server, pages, workers);
     spoil(world.network());
     let delay_ns = world.network().delay_ns_max();
-    let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, map.len(), delay_ns);
+    let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, frame, delay_ns);
     Ok(Simulated { bound, ..world.run(watch)? })
 }
 

@@ -6,6 +6,7 @@ use super::{Back, DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Stor
 use crate::policy::{Choice, Situation, decide};
 use crate::rules;
 use hybray_arena::List;
+use hybray_bintree::walk::FROM_ROOT;
 use hybray_link::{HOST, Peer};
 use hybray_wire::RayRecord;
 
@@ -76,62 +77,28 @@ impl<P: Store> Node<'_, '_, P> {
         true
     }
 
-    /// Looks at wanted pages, and has their rays go there or the pages come here.
+    /// Looks at wanted pages, and has their rays go there or the pages come here. Those that have been wanted for longest
+    /// come first: while there is no place for one, nobody behind it is given one. But the rays of those behind may go.
     pub(super) fn decide(&mut self, now: u64) {
-        let load = u32::from(self.load());
         // The lane first: nothing else must take its turn.
         if let Some(ray) = self.aside.filter(|ray| !at_hand(&self.scene.at_hand(&self.store), ray.page)) {
             self.request(ray.page, true);
         }
-        let count = self.memory.pool.wanted().len();
-        for _ in 0..count.min(DECISIONS) {
-            let wanted = self.memory.pool.wanted();
-            if wanted.is_empty() {
-                break;
-            }
-            self.looked_at = if self.looked_at < wanted.len() { self.looked_at } else { 0 };
-            let page = wanted[self.looked_at];
-            self.looked_at += 1;
-            let state = *self.memory.pool.page(page);
-            if state.asked {
-                continue;
-            }
-            let entry = self.scene.resident.directory.entries[page as usize];
-            let Some(oldest) = self.memory.pool.oldest(page) else { continue };
-            let (kind, moved) = (oldest.ray_kind(), oldest.moved == 1);
-            let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
-            let situation = Situation {
-                rays: self.memory.pool.waiting(page) as u32,
-                kind,
-                page_bytes: entry.bytes,
-                uses: u32::from(state.uses),
-                owner_is_full: owner.full,
-                owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
-                outbox: owner.outbox.len() as u32,
-                owner_load: u32::from(owner.load),
-                load,
-                granularity: u32::from(self.settings.granularity),
-                ray_ns: self.settings.ray_ns,
-                link: self.settings.link,
-            };
-            let choice = if moved { Choice::Fetch } else { decide(self.settings.policy, &situation) };
-            match choice {
-                Choice::Forward => {
-                    let outbox = self.memory.peers.send(entry.owner, now);
-                    self.memory.pool.move_to(page, outbox);
-                }
-                Choice::Fetch => {
-                    let has_place = self.request(page, false);
-                    if rules::goes_again(has_place, owner.full, situation.owner_traces) {
-                        // No place for the page either: the owner is asked once more.
-                        let outbox = self.memory.peers.send(entry.owner, now);
-                        self.memory.pool.move_to(page, outbox);
-                    }
-                }
+        let load = u32::from(self.load());
+        let (mut next, mut has_room) = (self.memory.pool.first_wanted(), true);
+        for _ in 0..DECISIONS {
+            let Some(page) = next else { break };
+            next = self.memory.pool.wanted_after(page);
+            let stays = !self.settle(page, has_room, load, now);
+            if stays && core::mem::take(&mut has_room) && self.memory.pool.is_wanted(self.looked_at) {
+                next = Some(self.looked_at);
             }
         }
+        if !has_room {
+            self.looked_at = next.unwrap_or(FROM_ROOT);
+        }
         // The next bundle's pages once, when no ray is left that waits for one that was not asked for.
-        if !self.ahead.tried && self.all_wanted_are_asked() {
+        if !self.ahead.tried && self.memory.pool.first_wanted().is_none() {
             self.ahead.tried = true;
             for at in 0..self.ahead.pages().len() {
                 let page = self.ahead.pages()[at];
@@ -142,25 +109,54 @@ impl<P: Store> Node<'_, '_, P> {
         }
     }
 
-    fn all_wanted_are_asked(&mut self) -> bool {
-        let pool = &mut self.memory.pool;
-        (0..pool.wanted().len()).all(|at| {
-            let page = pool.wanted()[at];
-            pool.page(page).asked
-        })
+    /// Decides about a wanted page; false if it stays wanted. It can only be asked for if the cache `has_room`.
+    fn settle(&mut self, page: u32, has_room: bool, load: u32, now: u64) -> bool {
+        let entry = self.scene.resident.directory.entries[page as usize];
+        let uses = u32::from(self.memory.pool.page(page).uses);
+        let Some(oldest) = self.memory.pool.oldest(page) else { return false };
+        let (kind, moved) = (oldest.ray_kind(), oldest.moved == 1);
+        let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
+        let situation = Situation {
+            rays: self.memory.pool.waiting(page) as u32,
+            kind,
+            page_bytes: entry.bytes,
+            uses,
+            owner_is_full: owner.full,
+            owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
+            outbox: owner.outbox.len() as u32,
+            owner_load: u32::from(owner.load),
+            load,
+            granularity: u32::from(self.settings.granularity),
+            ray_ns: self.settings.ray_ns,
+            link: self.settings.link,
+        };
+        // Rays that were given to this node, or came back to it, go nowhere before their page has come.
+        let choice = if moved { Choice::Fetch } else { decide(self.settings.policy, &situation) };
+        if choice == Choice::Fetch && has_room && self.request(page, false) {
+            return true;
+        }
+        // No place for the page: if its owner had no room either, it is asked once more.
+        let goes = choice == Choice::Forward || rules::goes_again(moved, owner.full, situation.owner_traces);
+        if goes {
+            let outbox = self.memory.peers.send(entry.owner, now);
+            self.memory.pool.move_to(page, outbox);
+        }
+        goes
     }
 
-    /// Has rays that were to go elsewhere wait here again. Their places were free this moment, so there is room.
-    pub(super) fn wait_again(&mut self, mut list: List) {
+    /// Has rays that were to go elsewhere wait here again; `moved` if they were there, and have had their move. Their places
+    /// were free this moment, so there is room.
+    pub(super) fn wait_again(&mut self, mut list: List, moved: bool) {
         while let Some(ray) = self.memory.pool.pop(&mut list) {
             let here = self.store.page(ray.page).is_some();
-            let _ = self.memory.pool.push(ray, here);
+            let _ = self.memory.pool.push(RayRecord { moved: ray.moved | u8::from(moved), ..ray }, here);
         }
     }
 
     /// Reserves a place for `page`, and has it asked for.
     fn request(&mut self, page: u32, for_lane: bool) -> bool {
-        if self.requests.iter().any(|r| r.page == page) {
+        if let Some(at) = self.requests.iter().position(|r| r.page == page) {
+            self.requests[..=at].rotate_right(usize::from(for_lane));
             return true;
         }
         let requests = usize::from(self.settings.requests).clamp(1, REQUESTS_MAX);
@@ -174,9 +170,10 @@ impl<P: Store> Node<'_, '_, P> {
         if !self.store.reserve(page, for_lane, &|p| pool.waiting(p) > 0) {
             return false;
         }
-        self.memory.pool.page(page).asked = true;
-        // There is room: the limit was looked at.
+        self.memory.pool.ask(page);
+        // There is room: the limit was looked at. They are asked for in this order.
         let _ = self.requests.push(Request { page, from, sent: false });
+        self.requests.rotate_right(usize::from(for_lane));
         self.high_water.requests = (self.high_water.requests.0.max(self.requests.len()), REQUESTS_MAX + 1);
         self.high_water.page_bytes = self.high_water.page_bytes.max(self.store.bytes_held());
         true

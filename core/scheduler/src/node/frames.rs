@@ -38,7 +38,7 @@ impl<P: Store> Node<'_, '_, P> {
                     return;
                 }
                 self.traffic.refused += count;
-                self.wait_again(flight);
+                self.wait_again(flight, true);
             }
             _ => {
                 for bytes in view.body.chunks_exact(size_of::<Partial>()) {
@@ -103,14 +103,14 @@ impl<P: Store> Node<'_, '_, P> {
         match self.store.land(page, offset as usize, part) {
             Landed::Part => {}
             Landed::Whole => {
-                self.requests.swap_remove(at);
+                self.requests.remove(at);
                 self.traffic.fetched += 1;
                 self.memory.pool.landed(page);
             }
             // It will be wanted again, and its home has it.
             Landed::Refused => {
-                self.requests.swap_remove(at);
-                self.memory.pool.page(page).asked = false;
+                self.requests.remove(at);
+                self.memory.pool.comes_not(page);
             }
         }
     }

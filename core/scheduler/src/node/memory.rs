@@ -79,7 +79,6 @@ macro_rules! terms {
             $do!("rays that wait", RayRecord, l.rays, || record),
             $do!("links between rays that wait", u32, l.rays, || 0u32),
             $do!("what is known of pages", PageState, l.pages, || PageState::NEW),
-            $do!("pages that rays wait for", u32, l.pages, || 0u32),
             $do!("pages at hand that rays wait for", u32, l.pages, || 0u32),
             $do!("partial sums for others' tiles", Partial, l.partials, Partial::default),
             $do!("links between partial sums", u32, l.partials, || 0u32),
@@ -122,14 +121,14 @@ impl<'m> NodeMemory<'m> {
             };
         }
         let t = terms!(limits, take);
-        let (bundle, lane, tiles, rays, ray_links, pages, wanted, ready) = (t.0, t.1, t.2, t.3, t.4, t.5, t.6, t.7);
-        let (partials, partial_links, owed, owing) = (t.8, t.9, t.10, t.11);
-        let (peers, answers, asked, turns, sends, unclipped, clip_turns) = (t.12, t.13, t.14, t.15, t.16, t.17, t.18);
+        let (bundle, lane, tiles, rays, ray_links, pages, ready) = (t.0, t.1, t.2, t.3, t.4, t.5, t.6);
+        let (partials, partial_links, owed, owing) = (t.7, t.8, t.9, t.10);
+        let (peers, answers, asked, turns, sends, unclipped, clip_turns) = (t.11, t.12, t.13, t.14, t.15, t.16, t.17);
         Ok(Self {
             bundle: &mut bundle[0],
             lane,
             tiles,
-            pool: Pool::new(Slab::new(rays, ray_links), pages, wanted, Ring::new(ready)),
+            pool: Pool::new(Slab::new(rays, ray_links), pages, Ring::new(ready)),
             partials: Slab::new(partials, partial_links),
             owed,
             owing: Ring::new(owing),

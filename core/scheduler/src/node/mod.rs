@@ -225,8 +225,8 @@ pub struct Node<'m, 's, P: Store> {
     aside: Option<RayRecord>,
     ahead: Ahead,
     requests: heapless::Vec<Request, { REQUESTS_MAX + 1 }>,
-    /// The wanted page that is looked at next.
-    looked_at: usize,
+    /// The wanted page that is looked at next, behind the first.
+    looked_at: u32,
     /// Runs that are done and not yet told.
     done: heapless::Deque<Run, RUNS>,
     greeted: [bool; 2],
@@ -287,7 +287,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             aside: None,
             ahead: Ahead::new(subhost),
             requests: heapless::Vec::new(),
-            looked_at: 0,
+            looked_at: FROM_ROOT,
             done: heapless::Deque::new(),
             greeted: [false; 2],
             report: false,
@@ -415,8 +415,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         state.lost = true;
         state.full = false;
         let (outbox, flight) = (core::mem::take(&mut state.outbox), core::mem::take(&mut state.flight));
-        self.wait_again(outbox);
-        self.wait_again(flight);
+        self.wait_again(outbox, false);
+        self.wait_again(flight, false);
         self.memory.server.lost(peer);
         self.memory.clips.lost(peer);
         self.ahead.lost(peer);
@@ -490,13 +490,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
             units += 1;
             if let Some(ray) = self.aside.take() {
+                // What the pool had no room for is finished on the spot.
                 let here = at_hand(&scene, ray.page);
-                self.aside = if here {
-                    lane.take(&scene, &mut walker, ray, &mut sums, &mut counts)
-                } else {
-                    pool.push(ray, false).err()
-                };
-                if self.aside.is_some_and(|ray| rules::lane_waits(at_hand(&scene, ray.page), pool.free())) {
+                self.aside = if here { lane.take(&scene, &mut walker, ray, &mut sums, &mut counts) } else { Some(ray) };
+                if self.aside.is_some_and(|ray| rules::lane_waits(at_hand(&scene, ray.page))) {
                     // Who only waits has nothing to do, and must not keep the processor busy with it.
                     units -= u32::from(!here);
                     break;

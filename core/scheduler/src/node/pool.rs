@@ -11,19 +11,23 @@ use hybray_wire::RayRecord;
 pub struct PageState {
     /// Rays that need it.
     rays: List,
-    /// Where it stands among the wanted pages.
-    wanted_at: u32,
+    /// Its neighbours in the queue of wanted pages, if it is in it.
+    before: u32,
+    after: u32,
     /// How often rays came to need it: halved now and then.
     pub uses: u16,
     /// It was asked for, and is on its way.
     pub asked: bool,
     /// It is queued as ready.
     ready: bool,
+    /// It is queued as wanted.
+    wanted: bool,
 }
 
 impl PageState {
     /// A page that nobody waits for.
-    pub const NEW: Self = Self { rays: List::EMPTY, wanted_at: NOWHERE, uses: 0, asked: false, ready: false };
+    pub const NEW: Self =
+        Self { rays: List::EMPTY, before: NOWHERE, after: NOWHERE, uses: 0, asked: false, ready: false, wanted: false };
 }
 
 const NOWHERE: u32 = u32::MAX;
@@ -36,9 +40,10 @@ const AGE_RAYS: usize = 256;
 pub struct Pool<'m> {
     slab: Slab<'m, RayRecord>,
     pages: &'m mut [PageState],
-    /// Pages that rays wait for and that are not at hand: the first `wanted_len`.
-    wanted: &'m mut [u32],
-    wanted_len: usize,
+    /// First and last of the pages that rays wait for, that are not at hand and were not asked for: in the order in which
+    /// they came to be wanted.
+    first_wanted: u32,
+    last_wanted: u32,
     /// Pages at hand that rays wait for.
     ready: Ring<'m, u32>,
     /// Rays that wait for pages that are queued as ready.
@@ -48,14 +53,9 @@ pub struct Pool<'m> {
 }
 
 impl<'m> Pool<'m> {
-    /// An empty pool. `pages`, `wanted` and `ready` have one entry for each page of the scene.
-    pub fn new(
-        slab: Slab<'m, RayRecord>,
-        pages: &'m mut [PageState],
-        wanted: &'m mut [u32],
-        ready: Ring<'m, u32>,
-    ) -> Self {
-        Self { slab, pages, wanted, wanted_len: 0, ready, ready_rays: 0, pushed: 0 }
+    /// An empty pool. `pages` and `ready` have one entry for each page of the scene.
+    pub fn new(slab: Slab<'m, RayRecord>, pages: &'m mut [PageState], ready: Ring<'m, u32>) -> Self {
+        Self { slab, pages, first_wanted: NOWHERE, last_wanted: NOWHERE, ready, ready_rays: 0, pushed: 0 }
     }
 
     /// Records that are free.
@@ -98,9 +98,19 @@ impl<'m> Pool<'m> {
         self.slab.iter(&self.pages[page as usize].rays).next()
     }
 
-    /// Pages that rays wait for and that are not at hand.
-    pub fn wanted(&self) -> &[u32] {
-        &self.wanted[..self.wanted_len]
+    /// The page that has been wanted for longest: rays wait for it, it is not at hand and was not asked for.
+    pub fn first_wanted(&self) -> Option<u32> {
+        (self.first_wanted != NOWHERE).then_some(self.first_wanted)
+    }
+
+    /// Whether a page is wanted.
+    pub fn is_wanted(&self, page: u32) -> bool {
+        self.pages.get(page as usize).is_some_and(|page| page.wanted)
+    }
+
+    /// The page that came to be wanted next after `page`.
+    pub fn wanted_after(&self, page: u32) -> Option<u32> {
+        Some(self.pages[page as usize].after).filter(|&after| after != NOWHERE)
     }
 
     /// Queues a ray for the page that it names; `at_hand` says whether that is here.
@@ -109,7 +119,13 @@ impl<'m> Pool<'m> {
     /// If the pool is full: the ray comes back.
     pub fn push(&mut self, ray: RayRecord, at_hand: bool) -> Result<(), RayRecord> {
         let page = ray.page;
-        self.slab.push_back(&mut self.pages[page as usize].rays, ray)?;
+        let rays = &mut self.pages[page as usize].rays;
+        // Those that have to stay stand first: while there are any, the others stay with them.
+        if ray.moved == 1 {
+            self.slab.push_front(rays, ray)?
+        } else {
+            self.slab.push_back(rays, ray)?
+        }
         self.age();
         let state = &mut self.pages[page as usize];
         state.uses = state.uses.saturating_add(1);
@@ -124,23 +140,46 @@ impl<'m> Pool<'m> {
     }
 
     fn want(&mut self, page: u32) {
+        let before = self.last_wanted;
         let state = &mut self.pages[page as usize];
-        if state.wanted_at == NOWHERE {
-            state.wanted_at = self.wanted_len as u32;
-            self.wanted[self.wanted_len] = page;
-            self.wanted_len += 1;
+        if state.wanted || state.asked {
+            return;
+        }
+        (state.wanted, state.before, state.after) = (true, before, NOWHERE);
+        self.last_wanted = page;
+        match self.pages.get_mut(before as usize) {
+            Some(last) => last.after = page,
+            None => self.first_wanted = page,
         }
     }
 
     fn unwant(&mut self, page: u32) {
-        let at = core::mem::replace(&mut self.pages[page as usize].wanted_at, NOWHERE);
-        if at != NOWHERE {
-            self.wanted_len -= 1;
-            let last = self.wanted[self.wanted_len];
-            self.wanted[at as usize] = last;
-            if last != page {
-                self.pages[last as usize].wanted_at = at;
-            }
+        let state = &mut self.pages[page as usize];
+        if !core::mem::take(&mut state.wanted) {
+            return;
+        }
+        let (before, after) = (state.before, state.after);
+        match self.pages.get_mut(before as usize) {
+            Some(state) => state.after = after,
+            None => self.first_wanted = after,
+        }
+        match self.pages.get_mut(after as usize) {
+            Some(state) => state.before = before,
+            None => self.last_wanted = before,
+        }
+    }
+
+    /// A page is to be asked for: nothing is left to be decided about it.
+    pub fn ask(&mut self, page: u32) {
+        self.pages[page as usize].asked = true;
+        self.unwant(page);
+    }
+
+    /// A page that was asked for does not come: the rays that wait for it want it again.
+    pub fn comes_not(&mut self, page: u32) {
+        self.pages[page as usize].asked = false;
+        if self.waiting(page) > 0 && !self.pages[page as usize].ready {
+            self.want(page);
         }
     }
 
@@ -180,15 +219,20 @@ impl<'m> Pool<'m> {
     }
 
     /// Moves half of the rays of the page at hand that most of them wait for, and at most `most`, to the end of `list`:
-    /// for a node that has nothing to do. Few are not worth a page. Returns how many. Bounded: the ready pages, and the
-    /// rays of one.
+    /// for a node that has nothing to do. Few are not worth a page, and those that have moved since their last page stay.
+    /// Returns how many. Bounded: the ready pages, and the rays of one.
     pub fn give(&mut self, list: &mut List, most: usize) -> usize {
         let Some(&page) = self.ready.iter().max_by_key(|&&page| self.waiting(page)) else { return 0 };
-        let count = (self.waiting(page) / 2).min(most);
+        let rays = &mut self.pages[page as usize].rays;
+        let stay = self.slab.iter(rays).take_while(|ray| ray.moved == 1).count();
+        let count = (rays.len() / 2).min(rays.len() - stay).min(most);
         if count < GIVEN_MIN {
             return 0;
         }
-        let mut given = self.slab.split_front(&mut self.pages[page as usize].rays, count);
+        let mut stay = self.slab.split_front(rays, stay);
+        let mut given = self.slab.split_front(rays, count);
+        self.slab.append(&mut stay, rays);
+        *rays = stay;
         self.ready_rays -= count;
         for _ in 0..count {
             let Some(ray) = self.slab.pop_front(&mut given) else { break };
@@ -251,5 +295,88 @@ impl<'m> Pool<'m> {
             self.pushed = 0;
             self.pages.iter_mut().for_each(|page| page.uses /= 2);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+    use std::vec::Vec;
+
+    const PAGES: u32 = 6;
+    const RAYS: usize = 64;
+
+    fn ray(page: u32, moved: u8) -> RayRecord {
+        RayRecord { page, moved, ..bytemuck::Zeroable::zeroed() }
+    }
+
+    /// Runs `test` with an empty pool.
+    fn with_pool(test: impl FnOnce(&mut Pool<'_>)) {
+        let (mut rays, mut next) = ([ray(0, 0); RAYS], [0; RAYS]);
+        let (mut pages, mut ready) = ([PageState::NEW; PAGES as usize], [0; PAGES as usize]);
+        test(&mut Pool::new(Slab::new(&mut rays, &mut next), &mut pages, Ring::new(&mut ready)));
+    }
+
+    fn wanted(pool: &Pool<'_>) -> Vec<u32> {
+        std::iter::successors(pool.first_wanted(), |&page| pool.wanted_after(page)).collect()
+    }
+
+    /// Against a plain list: whatever comes, lands, goes and does not come, the order is that of coming.
+    #[test]
+    fn pages_are_wanted_in_the_order_in_which_they_came_to_be() {
+        with_pool(|pool| {
+            let (mut expected, mut asked) = (Vec::new(), Vec::new());
+            let (mut seed, mut list) = (1u32, List::EMPTY);
+            for _ in 0..5000 {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let page = (seed >> 8) % PAGES;
+                let (is_wanted, is_asked) = (expected.contains(&page), asked.contains(&page));
+                match seed >> 29 {
+                    0..4 if pool.push(ray(page, 0), false).is_ok() && !is_wanted && !is_asked => expected.push(page),
+                    4 if is_wanted => {
+                        pool.ask(page);
+                        asked.push(page);
+                    }
+                    5 if is_wanted => pool.move_to(page, &mut list),
+                    6 if is_asked => {
+                        pool.landed(page);
+                        while pool.pop_ready().is_some() {}
+                    }
+                    7 if is_asked => {
+                        pool.comes_not(page);
+                        expected.push(page);
+                    }
+                    _ => continue,
+                }
+                match seed >> 29 {
+                    4 | 5 => expected.retain(|&other| other != page),
+                    6 | 7 => asked.retain(|&other| other != page),
+                    _ => {}
+                }
+                while pool.pop(&mut list).is_some() {}
+                assert_eq!(wanted(pool), expected);
+                assert!((0..PAGES).all(|page| pool.is_wanted(page) == expected.contains(&page)));
+            }
+        });
+    }
+
+    #[test]
+    fn rays_that_have_moved_stay_and_stand_first() {
+        with_pool(|pool| {
+            let moved = |pool: &mut Pool<'_>| pool.oldest(1).map(|ray| ray.moved);
+            for at in 0..40 {
+                pool.push(ray(1, u8::from(at % 4 == 3)), true).unwrap();
+                assert_eq!(moved(pool), Some(u8::from(at >= 3)));
+            }
+            let mut given = List::EMPTY;
+            assert_eq!(pool.give(&mut given, 100), 20, "half of them");
+            assert_eq!((pool.ready_rays(), pool.waiting(1)), (20, 20));
+            assert_eq!(pool.give(&mut given, 100), 10);
+            assert_eq!(pool.give(&mut given, 100), 0, "the others have moved");
+            assert!(pool.iter(&given).all(|ray| ray.moved == 1));
+            let left: Vec<u8> = std::iter::from_fn(|| pool.pop_ready().map(|ray| ray.moved)).collect();
+            assert_eq!(left, [1; 10], "those that had moved before");
+        });
     }
 }

@@ -18,7 +18,8 @@ pub enum Bug {
     LaneHasNoPlace,
     /// The ray that the lane has in hand is not fetched for.
     LaneDoesNotFetch,
-    /// Rays go to an owner that has no room, whatever the policy: nothing is fetched instead.
+    /// Rays go to an owner that has no room, whatever the policy, and go there again when they come back: nothing is fetched
+    /// instead.
     ForwardsToTheFull,
     /// Peers are asked for more pages than they hear.
     AsksForMore,

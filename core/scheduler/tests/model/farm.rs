@@ -154,6 +154,8 @@ pub struct State {
     pub step: [u8; ITEMS],
     /// How often it went to another node since its last page.
     pub hops: [u8; ITEMS],
+    /// How often it came back since then, for want of room: 2 is often.
+    pub back: [u8; ITEMS],
     /// Children that its hit has spawned.
     pub cursor: [u8; ITEMS],
     /// Entries of it that have come home.
@@ -260,7 +262,6 @@ pub enum Unit {
     /// The lane waits for a page.
     Stuck,
     Aside,
-    Push,
     Lane,
     Ready,
     Primary,
@@ -312,6 +313,11 @@ impl Farm {
         members(s.nodes[node].waiting).filter(|&r| self.page(s, r) == page).fold(0, |set, r| set | bit(r))
     }
 
+    /// Whether one of these rays has had its move: then the others stay with it.
+    pub fn moved(&self, s: &State, rays: Set) -> bool {
+        members(rays).any(|ray| s.back[ray] > 0) && !self.is(Bug::ForwardsToTheFull)
+    }
+
     /// Records of the pool in use.
     pub fn in_pool(node: &Node) -> usize {
         let lists = node.outbox.iter().chain(&node.flight).map(|&set| count(set));
@@ -333,11 +339,7 @@ impl Farm {
         }
         if let Some(ray) = node.aside {
             let here = self.at_hand(s, n, self.page(s, usize::from(ray)));
-            return match here {
-                true => Unit::Aside,
-                false if rules::lane_waits(here, self.free(node)) => Unit::Stuck,
-                false => Unit::Push,
-            };
+            return if rules::lane_waits(here) { Unit::Stuck } else { Unit::Aside };
         }
         if node.lane != 0 {
             return Unit::Lane;
@@ -383,6 +385,7 @@ impl Farm {
             wires: [[[Message::None; ROOM]; NODES]; NODES],
             step: [0; ITEMS],
             hops: [0; ITEMS],
+            back: [0; ITEMS],
             cursor: [0; ITEMS],
             ended: [0; ITEMS],
             born: 0,
@@ -477,6 +480,7 @@ impl Farm {
             link: LinkCost { message_ns: 20_000, byte_ps: 1_000 },
         };
         match self.policy {
+            _ if self.moved(s, rays) => vec![Choice::Fetch],
             Some(policy) => vec![decide(policy, &situation)],
             None => {
                 let (a, b) = (decide(Policy::DataParallel, &situation), decide(Policy::DemandDriven, &situation));

@@ -58,10 +58,10 @@ pub fn hungry() -> Farm {
     Farm { capacity: 2, common: 2, requests: 2, ..farm(2, &[0, 1, 1, 1], rays) }
 }
 
-/// Rays for more pages than places, the lane's included: the lane's page may go while rays of the pool wait for it.
+/// Rays for more pages than places, the lane's included: the lane's page goes when the ray in hand needs another, while a
+/// ray of the pool waits for it.
 pub fn crowded() -> Farm {
-    let rays = (1..5).map(|page| ray(0, &[page], &[])).collect();
-    farm(2, &[0, 1, 1, 1, 1], rays)
+    farm(2, &[0, 1, 1, 1], vec![ray(0, &[1], &[]), ray(0, &[2], &[]), ray(0, &[1, 3], &[]), ray(0, &[3], &[])])
 }
 
 /// Some of them with more rays: millions of states.

@@ -16,7 +16,7 @@ use bug::Bug;
 use farm::Farm;
 use graph::{Seen, Wrong, runs_end};
 use hybray_scheduler::policy::Policy;
-use properties::{BALANCES, CAPACITY, GOES_ON, LANDS, ONE_FRAME, PLACES, STAYS};
+use properties::{BACK, BALANCES, CAPACITY, GOES_ON, LANDS, ONE_FRAME, PLACES, STAYS};
 use stateright::{Checker, HasDiscoveries, Model};
 
 const STATES_MAX: usize = 400_000;
@@ -135,6 +135,7 @@ fn bugs_break_laws() {
     breaks(Bug::GivesUpLanding, farms::contended(), STAYS);
     breaks(Bug::LaneHasNoPlace, farms::contended(), GOES_ON);
     breaks(Bug::LaneDoesNotFetch, farms::contended(), GOES_ON);
+    breaks(Bug::ForwardsToTheFull, farms::crossing(), BACK);
     breaks(Bug::AsksForMore, farms::hungry(), GOES_ON);
     breaks(Bug::StaysReady, two(farms::crowded()), GOES_ON);
     breaks(Bug::EntryWithoutChildren, farms::crossing(), BALANCES);
@@ -142,13 +143,10 @@ fn bugs_break_laws() {
     breaks(Bug::ForgetsShare, farms::shared(), GOES_ON);
 }
 
-/// Bugs that break no law in any state, but let a run go on for ever.
+/// A bug that breaks no law in any state, but lets a run go on for ever.
 #[test]
-fn bugs_go_in_circles() {
-    let two = |farm: Farm| Farm { capacity: 2, ..farm };
-    for (bug, farm) in [(Bug::GivesUpWanted, two(farms::contended())), (Bug::ForwardsToTheFull, farms::crossing())] {
-        let found = runs_end(&Farm { bug: Some(bug), ..farm }, STATES_MAX);
-        let Err(Wrong::Circle(states, _)) = found else { panic!("{bug:?}: {found:?}") };
-        println!("{bug:?}: a circle among {states} states");
-    }
+fn a_bug_goes_in_circles() {
+    let found = runs_end(&Farm { capacity: 2, bug: Some(Bug::GivesUpWanted), ..farms::contended() }, STATES_MAX);
+    let Err(Wrong::Circle(states, _)) = found else { panic!("{found:?}") };
+    println!("a circle among {states} states");
 }

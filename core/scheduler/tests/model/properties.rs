@@ -9,13 +9,14 @@ pub const CAPACITY: &str = "no pool is over its capacity";
 pub const LANDS: &str = "each page that is asked for has one place";
 pub const STAYS: &str = "no page is given up while it lands";
 pub const ONE_FRAME: &str = "one frame of rays is under way between two nodes";
+pub const BACK: &str = "a ray comes back at most once between two pages";
 pub const BALANCES: &str = "a tile balances exactly when all its rays have ended";
 pub const GOES_ON: &str = "nothing stands still before the end";
 
 /// A name, and what must hold.
 type Law = (&'static str, fn(&Farm, &State) -> bool);
 
-pub const LAWS: [Law; 9] = [
+pub const LAWS: [Law; 10] = [
     (PLACES, |farm, s| (0..farm.rays.len()).all(|ray| places_of(farm, s, ray) == s.born >> ray & 1)),
     (CAPACITY, |farm, s| s.nodes.iter().all(|node| Farm::in_pool(node) <= farm.capacity)),
     (LANDS, |farm, s| {
@@ -39,6 +40,7 @@ pub const LAWS: [Law; 9] = [
     ("a ray moves at most once between two pages, twice when shared", |farm, s| {
         s.hops.iter().all(|&hops| hops <= 1 + u8::from(farm.shares > 0))
     }),
+    (BACK, |_, s| s.back.iter().all(|&back| back <= 1)),
     ("no ray waits unheeded for a page at hand", |farm, s| {
         (0..farm.nodes).all(|n| {
             members(s.nodes[n].waiting)

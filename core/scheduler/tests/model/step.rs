@@ -42,12 +42,12 @@ impl Farm {
             Action::Decide { node, page, choice, nth } => {
                 let owner = self.owners[page];
                 let (full, traces) = (s.nodes[node].full & bit(owner) != 0, self.traces(owner));
+                let rays = self.waiting_for(&s, node, page);
                 let forwards = choice == Choice::Forward || {
                     let has_place = self.request(&mut s, node, page, false, nth)?;
-                    rules::goes_again(has_place, full, traces)
+                    !has_place && rules::goes_again(self.moved(&s, rays), full, traces)
                 };
                 if forwards {
-                    let rays = self.waiting_for(&s, node, page);
                     let me = &mut s.nodes[node];
                     me.waiting &= !rays;
                     me.outbox[owner] |= rays;
@@ -123,7 +123,10 @@ impl Farm {
                 node.full = node.full & !bit(from) | if taken { 0 } else { bit(from) };
                 let back = core::mem::take(&mut node.flight[from]);
                 if !rules::frees(taken) {
-                    members(back).for_each(|ray| self.push(s, to, ray));
+                    for ray in members(back) {
+                        s.back[ray] = (s.back[ray] + 1).min(2);
+                        self.push(s, to, ray);
+                    }
                 }
             }
             Message::Fetch(page) => {
@@ -194,6 +197,7 @@ impl Farm {
             }
             s.step[ray] += 1;
             s.hops[ray] = 0;
+            s.back[ray] = 0;
         }
         if plan.children.is_empty() {
             self.end(s, node, ray);
@@ -211,10 +215,6 @@ impl Farm {
                 if self.take(s, n, usize::from(ray)) {
                     s.nodes[n].aside = Some(ray);
                 }
-            }
-            Unit::Push => {
-                let Some(ray) = s.nodes[n].aside.take() else { return };
-                self.push(s, n, usize::from(ray));
             }
             Unit::Lane => {
                 // Depth first: the record that none of the others has spawned any of.
