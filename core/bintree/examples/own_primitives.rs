@@ -4,7 +4,7 @@
 
 use hybray_bintree::cut::{self, Cut, Primitives};
 use hybray_bintree::walk::{self, Counts, Resident, Stack};
-use hybray_bintree::{BinaryNode, Item, sah, top};
+use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Cone, Ray, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Kind, Node, PageEntry, PageView, Tables};
@@ -61,7 +61,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // 3. Pages of at most 16 KiB, and the directory above them.
     let (mut pages, mut entries, mut above) = (Vec::new(), Vec::new(), top::Builder::new());
     let mut scratch = Box::<cut::Scratch>::default();
-    cut::pages(&binary[..used], &items, &garden, 16 * 1024, &mut scratch, &mut |aabb, cut| match cut {
+    let mut forests = vec![Forest::EMPTY; used];
+    cut::pages(&binary[..used], &items, &garden, 16 * 1024, &mut forests, &mut scratch, &mut |aabb, cut| match cut {
         Cut::Above => above.above(aabb),
         Cut::Page(lines) => {
             above.page(aabb, pages.len() as u32);
@@ -70,7 +71,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     })?;
     let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
-    let used = top::directory(&above.finish(), &mut nodes).ok_or("no builder makes a tree so deep")?;
+    let above = above.finish();
+    forests.resize(above.len(), Forest::EMPTY);
+    let used = top::directory(&above, &mut forests, &mut nodes).ok_or("no builder makes a tree so deep")?;
 
     // 4. Whoever receives a page validates it, once, and reads it where it is.
     let tables = Tables { materials: 2 };

@@ -2,7 +2,7 @@
 
 use crate::BINARY_DEPTH_MAX;
 use crate::binary::{BinaryNode, Item, bounds};
-use crate::collapse::{Binary, Full, collapse};
+use crate::collapse::{Binary, Forest, Full, above, apiece, collapse};
 use bytemuck::Zeroable;
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle};
 use hybray_scene::{
@@ -81,6 +81,8 @@ const RANGE: u32 = u32::MAX;
 struct Subject<'a> {
     nodes: &'a [BinaryNode],
     items: &'a [Item],
+    /// Costs of the nodes.
+    forests: &'a [Forest],
 }
 
 impl Subject<'_> {
@@ -118,6 +120,27 @@ impl Subject<'_> {
         };
         Some([half(part.first, first), half(part.first + first, part.count - first)])
     }
+
+    /// The cost of what has no nodes below.
+    fn range(&self, part: &Part) -> Forest {
+        if self.children(part).is_some() { Forest::leaves(part.aabb.half_area()) } else { Forest::LEAF }
+    }
+}
+
+/// The costs of all nodes, children before their parents.
+fn measure(nodes: &[BinaryNode], items: &[Item], forests: &mut [Forest]) {
+    let apiece = apiece(nodes.iter().filter(|n| n.is_leaf()).map(|n| &n.aabb));
+    for (here, node) in nodes.iter().enumerate().rev() {
+        forests[here] = if node.aabb.is_empty() {
+            Forest::LEAF
+        } else if node.is_leaf() {
+            let subject = Subject { nodes, items, forests };
+            subject.range(&subject.node(here as u32))
+        } else {
+            let below = [here + 1, node.second as usize].map(|child| (&nodes[child].aabb, &forests[child]));
+            above(below, node.aabb.half_area() + apiece)
+        };
+    }
 }
 
 /// A page being filled.
@@ -139,6 +162,10 @@ impl<P: Primitives> Binary for Filling<'_, P> {
 
     fn children(&self, part: Part) -> Option<[Part; 2]> {
         self.subject.children(&part)
+    }
+
+    fn forest(&self, part: Part) -> Forest {
+        if part.node == RANGE { self.subject.range(&part) } else { self.subject.forests[part.node as usize] }
     }
 
     fn leaf(&mut self, part: Part) -> Option<Child> {
@@ -280,20 +307,25 @@ pub enum CutError {
 /// Cuts the tree of `nodes` over `items` into pages of at most `bytes_max` bytes: in preorder, each subtree either is a
 /// page, or lies above pages. `emit` gets both with their boxes; [`crate::top::TopNode`]s are made of them.
 ///
-/// Bounded by the size of the tree times the page size over the least page.
+/// Bounded by the size of the tree times the page size over the least page. `forests` is scratch, one for each node.
 ///
 /// # Errors
 /// See [`CutError`].
+///
+/// # Panics
+/// If there are fewer `forests` than `nodes`.
 pub fn pages<P: Primitives>(
     nodes: &[BinaryNode],
     items: &[Item],
     source: &P,
     bytes_max: usize,
+    forests: &mut [Forest],
     scratch: &mut Scratch,
     emit: &mut impl FnMut(&Aabb, Cut<'_>),
 ) -> Result<(), CutError> {
     let bytes_max = bytes_max.min(PAGE_BYTES_MAX);
-    let subject = Subject { nodes, items };
+    measure(nodes, items, forests);
+    let subject = Subject { nodes, items, forests };
     let mut stack = [Part { aabb: Aabb::EMPTY, first: 0, count: 0, node: RANGE }; BINARY_DEPTH_MAX as usize + 40];
     let mut waiting = 0;
     if !nodes.is_empty() && !nodes[0].aabb.is_empty() {

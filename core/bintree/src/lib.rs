@@ -26,6 +26,7 @@ pub mod walk;
 
 pub use binary::{BinaryNode, Item};
 pub use check::check;
+pub use collapse::Forest;
 
 /// Levels of a binary tree at most; two of them make at most one level of wide nodes.
 pub const BINARY_DEPTH_MAX: u32 = 2 * hybray_scene::DEPTH_MAX as u32 - 2;

@@ -1,6 +1,6 @@
 //! The directory: wide nodes above the pages.
 
-use crate::collapse::{Binary, collapse};
+use crate::collapse::{Binary, Forest, above, apiece, collapse};
 use hybray_geometry::Aabb;
 use hybray_scene::{Child, Node};
 
@@ -71,27 +71,44 @@ pub const fn nodes_for(pages: usize) -> usize {
     if pages == 0 { 0 } else { pages }
 }
 
-struct Top<'a>(&'a [TopNode]);
+struct Top<'a> {
+    nodes: &'a [TopNode],
+    /// Their costs.
+    forests: &'a [Forest],
+}
 
 impl Binary for Top<'_> {
     type Part = u32;
     fn aabb(&self, part: u32) -> Aabb {
-        self.0[part as usize].aabb
+        self.nodes[part as usize].aabb
     }
     fn children(&self, part: u32) -> Option<[u32; 2]> {
-        let second = self.0[part as usize].second;
+        let second = self.nodes[part as usize].second;
         (second != 0).then_some([part + 1, second])
     }
+    fn forest(&self, part: u32) -> Forest {
+        self.forests[part as usize]
+    }
     fn leaf(&mut self, part: u32) -> Option<Child> {
-        Some(Child::Page(self.0[part as usize].page))
+        Some(Child::Page(self.nodes[part as usize].page))
     }
 }
 
 /// Collapses the tree above the pages into the directory's nodes; returns how many. `None` if `out` is shorter than
-/// [`nodes_for`], or the tree deeper than any builder's.
-pub fn directory(top: &[TopNode], out: &mut [Node]) -> Option<usize> {
+/// [`nodes_for`], `forests` (scratch) than `top`, or the tree deeper than any builder's.
+pub fn directory(top: &[TopNode], forests: &mut [Forest], out: &mut [Node]) -> Option<usize> {
+    let forests = forests.get_mut(..top.len())?;
     if top.is_empty() {
         return Some(0);
     }
-    collapse(&mut Top(top), 0, out).ok()
+    let apiece = apiece(top.iter().filter(|n| n.second == 0).map(|n| &n.aabb));
+    for (here, node) in top.iter().enumerate().rev() {
+        forests[here] = if node.second == 0 {
+            Forest::LEAF
+        } else {
+            let below = [here + 1, node.second as usize].map(|child| (&top[child].aabb, &forests[child]));
+            above(below, node.aabb.half_area() + apiece)
+        };
+    }
+    collapse(&mut Top { nodes: top, forests }, 0, out).ok()
 }

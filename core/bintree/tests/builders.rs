@@ -134,9 +134,18 @@ fn trees_stay_compact() {
     let (slots, bytes) = (census.slots as f64 / n, census.bytes as f64 / n);
     eprintln!("{:.2} slots, {:.4} wide nodes and {bytes:.1} bytes a triangle", slots, census.nodes as f64 / n);
     assert!(slots < 1.6 && bytes < 100.0, "{census:?}");
+    let views = built.views();
+    let (mut nodes, mut children) = (0, 0);
+    for node in views.iter().flat_map(|page| page.nodes) {
+        nodes += 1;
+        children += node.children().count();
+    }
+    let filled = children as f64 / nodes as f64;
+    eprintln!("{filled:.2} children a wide node");
+    assert!(filled > 5.5, "{filled}");
 
     // Near things first: far ones are then skipped.
-    let (views, mut counts) = (built.views(), Counts::default());
+    let mut counts = Counts::default();
     let scene = built.resident(&views);
     let rays = rays(&shapes, 400, 4);
     for (ray, expected) in &rays {

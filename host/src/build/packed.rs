@@ -4,8 +4,8 @@ use super::BuildError;
 use super::tree::VoxelTree;
 use crate::partition::{PlacedPage, Plan};
 use hybray_bintree::cut::FLAT;
-use hybray_bintree::top;
 use hybray_bintree::walk::Resident;
+use hybray_bintree::{Forest, top};
 use hybray_geometry::Aabb;
 use hybray_scene::{BLOCK, Directory, Kind, Line, Node, PageEntry, PageView, Slot, Tables, lines_for};
 use rayon::prelude::*;
@@ -310,8 +310,9 @@ impl Assembler {
     pub fn finish(mut self) -> Index {
         let top = self.top.finish();
         let mut nodes = vec![Node::EMPTY; top::nodes_for(self.index.entries.len())];
-        let used =
-            top::directory(&top, &mut nodes).expect("builders bound the depth, and there is a node for each page");
+        let forests = &mut vec![Forest::EMPTY; top.len()];
+        let used = top::directory(&top, forests, &mut nodes)
+            .expect("builders bound the depth, and there is a node for each page");
         nodes.truncate(used);
         self.index.nodes = nodes;
         self.index

@@ -4,7 +4,7 @@ use super::packed::{hash_page, primitives_in};
 use super::{Rule, Settings};
 use bytemuck::allocation::zeroed_box;
 use hybray_bintree::cut::{self, Cut, CutError, Primitives};
-use hybray_bintree::{BinaryNode, Item, midpoint, sah};
+use hybray_bintree::{BinaryNode, Forest, Item, midpoint, sah};
 use hybray_geometry::Aabb;
 use hybray_scene::{Header, Line, PageView, Tables};
 use rayon::prelude::*;
@@ -79,11 +79,11 @@ fn surface_area<P: Primitives + Sync>(
     let chunks = parts
         .into_par_iter()
         .map_init(
-            || (Vec::new(), zeroed_box::<cut::Scratch>()),
-            |(nodes, scratch), part| {
+            || (Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
+            |(nodes, forests, scratch), part| {
                 nodes.resize(sah::nodes_for(part.len()).max(nodes.len()), BinaryNode::EMPTY);
                 let used = sah::build(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
-                cut_chunk(&nodes[..used], part, source, page_bytes, scratch)
+                cut_chunk(&nodes[..used], part, source, page_bytes, forests, scratch)
             },
         )
         .collect::<Result<_, _>>()?;
@@ -104,7 +104,7 @@ fn midpoints<P: Primitives>(
     let tree = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &rule);
     let (used, held) = (tree.nodes.len(), tree.items.len());
     midpoint::tighten(&mut nodes[..used], &leaves[..held]);
-    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, page_bytes, &mut zeroed_box())?;
+    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, page_bytes, &mut Vec::new(), &mut zeroed_box())?;
     let root = BinaryNode { second: 0, ..nodes[0] };
     Ok(VoxelTree { tops: vec![root], chunks: vec![chunk] })
 }
@@ -124,10 +124,12 @@ fn cut_chunk<P: Primitives>(
     items: &[Item],
     source: &P,
     page_bytes: usize,
+    forests: &mut Vec<Forest>,
     scratch: &mut cut::Scratch,
 ) -> Result<Chunk, CutError> {
     let mut chunk = Chunk { lines: Vec::new(), events: Vec::new() };
-    cut::pages(nodes, items, source, page_bytes, scratch, &mut |aabb, cut| match cut {
+    forests.resize(nodes.len().max(forests.len()), Forest::EMPTY);
+    cut::pages(nodes, items, source, page_bytes, forests, scratch, &mut |aabb, cut| match cut {
         Cut::Above => chunk.events.push((*aabb, None)),
         Cut::Page(lines) => {
             let header: &Header = bytemuck::from_bytes(&lines[0].0);

@@ -6,7 +6,7 @@ pub mod scenes;
 use hybray_bintree::check::{Census, Coverage, Fault, check};
 use hybray_bintree::cut::{self, Cut, CutError, Primitives};
 use hybray_bintree::walk::{Counts, Resident, Stack, nearest, occluded};
-use hybray_bintree::{BinaryNode, Item, midpoint, sah, top};
+use hybray_bintree::{BinaryNode, Forest, Item, midpoint, sah, top};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Aabb, Candidate, Cone, Ray, RayKernel, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Header, Kind, Line, Node, PageEntry, PageView, Tables};
@@ -182,7 +182,8 @@ pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built
     let mut scratch = Box::<cut::Scratch>::default();
     let mut above = top::Builder::new();
     let (mut pages, mut entries) = (Vec::new(), Vec::new());
-    cut::pages(&tree.nodes, &tree.items, shapes, page_bytes, &mut scratch, &mut |aabb, cut| match cut {
+    let mut forests = vec![Forest::EMPTY; tree.nodes.len()];
+    cut::pages(&tree.nodes, &tree.items, shapes, page_bytes, &mut forests, &mut scratch, &mut |aabb, cut| match cut {
         Cut::Above => above.above(aabb),
         Cut::Page(lines) => {
             above.page(aabb, pages.len() as u32);
@@ -194,7 +195,9 @@ pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built
         }
     })?;
     let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
-    let used = top::directory(&above.finish(), &mut nodes).expect("there is a node for each page");
+    let above = above.finish();
+    forests.resize(above.len(), Forest::EMPTY);
+    let used = top::directory(&above, &mut forests, &mut nodes).expect("there is a node for each page");
     nodes.truncate(used);
     Ok(Built { pages, nodes, entries, materials: shapes.materials.into() })
 }

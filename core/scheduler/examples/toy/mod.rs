@@ -1,6 +1,6 @@
 //! A scene small enough to read: nine spheres on a large one, one of them a mirror and one of glass, and two lights.
 
-use hybray_bintree::{BinaryNode, Item, cut, sah, top};
+use hybray_bintree::{BinaryNode, Forest, Item, cut, sah, top};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageView, Tables};
 use hybray_shading::{Highlight, Light, LightKind, Material, spawn};
@@ -72,7 +72,8 @@ impl Toy {
         let mut tree = vec![BinaryNode::EMPTY; sah::nodes_for(items.len())];
         let used = sah::build(&mut items, &mut tree, &sah::Settings::default());
         let (mut page, mut aabb) = (Vec::new(), Aabb::EMPTY);
-        cut::pages(&tree[..used], &items, &spheres, 4096, &mut Box::default(), &mut |around, cut| {
+        let mut forests = vec![Forest::EMPTY; used];
+        cut::pages(&tree[..used], &items, &spheres, 4096, &mut forests, &mut Box::default(), &mut |around, cut| {
             if let cut::Cut::Page(lines) = cut {
                 aabb = *around;
                 page.extend_from_slice(lines);
@@ -80,7 +81,8 @@ impl Toy {
         })
         .expect("ten spheres fit a page");
         let mut nodes = vec![Node::EMPTY; top::nodes_for(1)];
-        let used = top::directory(&[top::TopNode { aabb, second: 0, page: 0 }], &mut nodes).expect("one page");
+        let used =
+            top::directory(&[top::TopNode { aabb, second: 0, page: 0 }], &mut forests, &mut nodes).expect("one page");
         nodes.truncate(used);
         let entries = vec![PageEntry { bytes: 64 * page.len() as u32, owner: 0, kind: 0 }];
         let matt = |diffuse| Material { diffuse, ambient: diffuse, ..Material::MATT };

@@ -3,7 +3,7 @@
 
 use hybray_bintree::cut::{self, Cut, Primitives};
 use hybray_bintree::walk::Resident;
-use hybray_bintree::{BinaryNode, Item, sah, top};
+use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::{Cone, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Header, Kind, Node, PageEntry, PageView, Tables};
 use hybray_shading::{self as shading, Light, Material, spawn};
@@ -73,7 +73,8 @@ impl World {
         let used = sah::build(&mut items, &mut binary, &sah::Settings::default());
         let (mut pages, mut entries, mut above) = (Vec::new(), Vec::new(), top::Builder::new());
         let mut scratch = Box::<cut::Scratch>::default();
-        cut::pages(&binary[..used], &items, self, page_bytes, &mut scratch, &mut |aabb, cut| match cut {
+        let mut forests = vec![Forest::EMPTY; used];
+        cut::pages(&binary[..used], &items, self, page_bytes, &mut forests, &mut scratch, &mut |aabb, cut| match cut {
             Cut::Above => above.above(aabb),
             Cut::Page(lines) => {
                 above.page(aabb, pages.len() as u32);
@@ -84,7 +85,9 @@ impl World {
         })
         .expect("a page holds a leaf");
         let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
-        let used = top::directory(&above.finish(), &mut nodes).expect("not deep");
+        let above = above.finish();
+        forests.resize(above.len(), Forest::EMPTY);
+        let used = top::directory(&above, &mut forests, &mut nodes).expect("not deep");
         let tables = Tables { materials: self.materials.len() };
         let views: Vec<PageView<'_>> =
             pages.iter().map(|lines| PageView::parse(lines, tables).expect("a builder's page")).collect();
