@@ -243,7 +243,7 @@ fn nothing_is_cut_off() {
                 .filter_map(|(aabb, child)| matches!(child, Child::Page(_)).then_some(aabb))
                 .collect();
             let mut random = Random(seed);
-            let rays: Vec<_> = (0..400)
+            let rays: Vec<_> = (0..500)
                 .map(|i| {
                     let (a, b) = (&boxes[random.below(boxes.len())], &boxes[random.below(boxes.len())]);
                     let corner = |random: &mut Random, a: &Aabb| {
