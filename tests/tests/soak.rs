@@ -10,7 +10,7 @@ use hybray::partition::{Voxels, light_caches, owners};
 use hybray::prepare::Prepared;
 use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
 use hybray_scene::lines_for;
-use hybray_scheduler::policy::{LinkCost, Policy, Tiles};
+use hybray_scheduler::policy::{Grid, LinkCost, Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
     Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_spoiled,
@@ -180,7 +180,15 @@ impl Draw {
             draw.spoil(random, message_ns);
         }
         draw.give_out(random);
+        draw.settings.grid = Self::grid(random, scene);
         draw
+    }
+
+    /// A grid that rays go through from voxel to voxel, the scene's or any other.
+    fn grid(random: &mut Random, scene: &Scene<'_>) -> Option<Grid> {
+        let any = [0; 3].map(|_| one_of(random, &[1, 2, 3, 4, 8]));
+        let sides = one_of(random, &[any, [2, 2, 1]]);
+        Voxels::Grid(sides).grid(scene).filter(|_| random.below(3) == 0)
     }
 
     /// When nodes are given tiles, which of them, and who clips for them.

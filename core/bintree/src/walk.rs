@@ -216,7 +216,8 @@ impl<S: Simd> Walker<S> {
             match Child::unpack(packed) {
                 Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
                 Child::Page(page) => {
-                    let Some(view) = scene.pages.page(page) else {
+                    let view = if ANY { scene.pages.page(page) } else { scene.pages.nearest(page) };
+                    let Some(view) = view else {
                         if !ANY || !past || from != FROM_ROOT {
                             return Some(page);
                         }

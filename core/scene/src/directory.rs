@@ -61,6 +61,12 @@ pub trait Pages {
     /// The page, if it is at hand.
     fn page(&self, number: u32) -> Option<PageView<'_>>;
 
+    /// The same for rays that look for their nearest hit: some pages may be there for shadow rays alone.
+    #[inline(always)]
+    fn nearest(&self, number: u32) -> Option<PageView<'_>> {
+        self.page(number)
+    }
+
     /// [`parents`] of the directory: what a walk needs to go on from a page. May be empty where every page is at hand.
     fn parents(&self) -> &[u32] {
         &[]

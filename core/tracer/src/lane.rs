@@ -19,6 +19,9 @@ pub trait Sink {
     fn ended(&mut self, origin: &Origin, entry: u64);
 }
 
+/// Says where a ray goes that hits nothing.
+pub type Beyond<'s> = &'s dyn Fn(&RayRecord) -> Option<u32>;
+
 /// What walks need: kernels, a stack, and counters.
 pub struct Walker<'s> {
     /// Which kernels the processor can run.
@@ -27,6 +30,8 @@ pub struct Walker<'s> {
     pub past: bool,
     /// Whether shadow rays that go to or from one place are traced together.
     pub bundles: bool,
+    /// Where a ray that hits nothing is still to go, if anywhere: a page that is not at hand.
+    pub beyond: Option<Beyond<'s>>,
     /// Scratch of walks.
     pub stack: &'s mut Stack,
     /// Scratch of bundles.
@@ -41,7 +46,16 @@ impl<'s> Walker<'s> {
     /// Traces each ray singly, until the first page that is not at hand.
     #[must_use]
     pub fn new(kernels: Kernels, stack: &'s mut Stack, together: &'s mut Together) -> Self {
-        Self { kernels, past: false, bundles: false, stack, together, counts: walk::Counts::default(), ahead: 0 }
+        Self {
+            kernels,
+            past: false,
+            bundles: false,
+            beyond: None,
+            stack,
+            together,
+            counts: walk::Counts::default(),
+            ahead: 0,
+        }
     }
 
     fn walk<const ANY: bool, P: Pages + ?Sized>(
@@ -81,6 +95,13 @@ impl<'s> Walker<'s> {
             }
             ray.settled = 1;
             ray.page = best.page;
+            if !best.candidate.is_hit()
+                && ray.kind != RayKind::Shadow as u8
+                && let Some(page) = self.beyond.and_then(|beyond| beyond(ray))
+            {
+                (ray.page, ray.moved) = (page, 0);
+                return None;
+            }
         }
         let at_hand = !best.candidate.is_hit() || scene.resident.pages.page(best.page).is_some();
         at_hand.then_some(best)

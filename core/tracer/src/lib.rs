@@ -12,6 +12,6 @@ mod scene;
 mod together;
 
 pub use hit::{HitRecord, Origin, surface, surface_point};
-pub use lane::{Lane, SHADOW_CHAIN_MAX, Sink, Walker, begin};
+pub use lane::{Beyond, Lane, SHADOW_CHAIN_MAX, Sink, Walker, begin};
 pub use scene::Scene;
 pub use together::{TOGETHER, Together, goes_together};

@@ -23,8 +23,8 @@ pub enum NoCandidate {
     },
 }
 
-/// Who is given no tiles under `criterion`: entry 0 is the host's. Nobody if there is one node alone. `voxels` is how the
-/// scene was cut, `objects` what node 1 and the others have in their pages.
+/// Who is given no tiles under `criterion`: entry 0 is the host's. Nobody if there is one node alone. `voxels` is how
+/// the scene was cut, `objects` what node 1 and the others have in their pages.
 ///
 /// # Errors
 /// If that is everybody: what would do.
@@ -62,7 +62,7 @@ fn boundary(sides: [u32; 3]) -> Vec<bool> {
 }
 
 /// Columns and rows of a grid, as square as it can be.
-fn square(nodes: u32) -> [u32; 2] {
+pub(crate) fn square(nodes: u32) -> [u32; 2] {
     let rows = (1..=nodes).take_while(|rows| rows * rows <= nodes).filter(|rows| nodes.is_multiple_of(*rows)).last();
     let rows = rows.unwrap_or(1);
     [nodes / rows, rows]

@@ -11,6 +11,7 @@ mod pilot;
 mod placement;
 mod voxels;
 
+pub(crate) use barred::square;
 pub use barred::{NoCandidate, barred};
 pub use budget::{Fit, NoFit, Wanted, page_bytes_for};
 pub use light_cache::{LightCaches, light_caches};

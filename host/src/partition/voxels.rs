@@ -4,14 +4,16 @@
 //! voxels are numbered in the order of that tree's leaves: neighbours in number are neighbours in space, as along a
 //! Morton curve.
 //!
-//! A primitive stands in every voxel that the inside of its box reaches into, with the part of its box in there. That is
-//! the midpoint tree's rule, and so is the proof that no hit is missed (`docs/NUMERICS.md`, spatial splits): wherever
-//! the planes lie, one of the voxels holds the primitive with a part whose slab interval has the hit. The tree of that
-//! voxel may therefore be built of the parts, and the outermost voxels reach to infinity: no bound of the scene decides
-//! anything.
+//! A primitive stands in every voxel that the inside of its box reaches into, with the part of its box in there. That
+//! is the midpoint tree's rule, and so is the proof that no hit is missed (`docs/NUMERICS.md`, spatial splits):
+//! wherever the planes lie, one of the voxels holds the primitive with a part whose slab interval has the hit. The tree
+//! of that voxel may therefore be built of the parts, and the outermost voxels reach to infinity: no bound of the scene
+//! decides anything.
 
 use hybray_bintree::Item;
-use hybray_geometry::Aabb;
+use hybray_geometry::{Aabb, Vec3};
+use hybray_scheduler::policy::Grid;
+use hybray_tracer::Scene;
 
 /// Most voxels of a scene.
 pub const VOXELS_MAX: u32 = 65_536;
@@ -37,6 +39,17 @@ impl Voxels {
             Self::Grid(sides) => sides.iter().product(),
             Self::Adaptive(n) => n,
         }
+    }
+
+    /// The grid that rays go through from voxel to voxel, where the scene was cut into one.
+    #[must_use]
+    pub fn grid(self, scene: &Scene<'_>) -> Option<Grid> {
+        let Self::Grid(sides) = self else { return None };
+        let nodes = scene.resident.directory.nodes;
+        let boxes = nodes.first().into_iter().flat_map(|root| root.children().map(|(slot, _)| root.aabb(slot)));
+        let bounds = boxes.fold(Aabb::EMPTY, |all, aabb| all.union(&aabb));
+        let corner = |at: Vec3| at.to_array();
+        (!bounds.is_empty()).then(|| Grid { lo: corner(bounds.lo), hi: corner(bounds.hi), sides })
     }
 }
 
@@ -98,12 +111,12 @@ const BINS: usize = 256;
 impl Plan {
     /// Cuts the scene of `bounds`, of which `sample` tells what is where.
     ///
-    /// Voxels of equal work are found top down: the longest axis is cut where the shares of work on both sides are those of
-    /// the voxels that they will become. The **work** of a primitive is estimated as one half its share of the
-    /// number of primitives, and one half its share of their boxes' surface. A ray meets a box with a probability
-    /// that goes as its surface, so that counting alone would give a floor of two triangles, which half the rays
-    /// meet, to one of many voxels; surface alone would put all the small things, which take the memory, into a few.
-    /// The work of a primitive is spread evenly over its box.
+    /// Voxels of equal work are found top down: the longest axis is cut where the shares of work on both sides are
+    /// those of the voxels that they will become. The **work** of a primitive is estimated as one half its share of the
+    /// number of primitives, and one half its share of their boxes' surface. A ray meets a box with a probability that
+    /// goes as its surface, so that counting alone would give a floor of two triangles, which half the rays meet, to
+    /// one of many voxels; surface alone would put all the small things, which take the memory, into a few. The work of
+    /// a primitive is spread evenly over its box.
     #[must_use]
     pub fn new(voxels: Voxels, bounds: &Aabb, sample: &[Item]) -> Self {
         match voxels {
@@ -298,7 +311,6 @@ fn plane(parts: &[Aabb], axis: usize, [lo, hi]: [f32; 2], share: f64, work: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hybray_geometry::Vec3;
     use hybray_scene::Kind;
 
     fn random(seed: &mut u64) -> f32 {
@@ -435,6 +447,96 @@ mod tests {
                 assert_eq!(*part, point.aabb());
             });
             assert_eq!((plan.voxels(), found), (9, 1));
+        }
+    }
+
+    /// The voxels that a ray goes through, by brute force: all planes cut it, up to where it leaves the box, and the
+    /// middle of each piece lies in one. `None` if a piece is so short that rounding decides.
+    fn crossed(plan: &Plan, grid: &Grid, origin: Vec3, direction: Vec3) -> Option<Vec<u16>> {
+        let (o, d) = (origin.to_array().map(f64::from), direction.to_array().map(f64::from));
+        let at = |axis: usize, at: u32| {
+            let (lo, hi) = (f64::from(grid.lo[axis]), f64::from(grid.hi[axis]));
+            (lo + (hi - lo) * f64::from(at) / f64::from(grid.sides[axis]) - o[axis]) / d[axis]
+        };
+        let ends = [0, 1, 2].map(|axis| [at(axis, 0), at(axis, grid.sides[axis])]);
+        let enters = ends.iter().fold(0.0f64, |t, [a, b]| t.max(a.min(*b)));
+        let leaves = ends.iter().fold(f64::INFINITY, |t, [a, b]| t.min(a.max(*b)));
+        if (leaves - enters).abs() < 1e-4 {
+            return None;
+        }
+        let mut cuts = vec![0.0];
+        if enters < leaves {
+            cuts.extend(
+                (0..3).flat_map(|axis| (1..grid.sides[axis]).map(move |n| (axis, n))).map(|(axis, n)| at(axis, n)),
+            );
+            cuts.push(leaves);
+            cuts.retain(|&t| t >= 0.0 && t <= leaves);
+        } else {
+            cuts.push(2e-4);
+        }
+        cuts.sort_by(f64::total_cmp);
+        let mut nodes = Vec::new();
+        for piece in cuts.windows(2) {
+            if piece[1] - piece[0] < 1e-4 {
+                return None;
+            }
+            let middle = std::array::from_fn(|axis| (o[axis] + d[axis] * (piece[0] + piece[1]) / 2.0) as f32);
+            let middle = Vec3::from_array(middle);
+            plan.place(&Aabb { lo: middle, hi: middle }, |voxel, _| nodes.push(voxel as u16 + 1));
+        }
+        Some(nodes)
+    }
+
+    /// Rays from within a grid and from without meet its voxels in the order in which they cross its planes; and
+    /// whoever passes them on, each step is one along that way, or straight to a node that is not on the rest of it.
+    #[test]
+    fn rays_go_from_voxel_to_voxel() {
+        let seed = &mut 7;
+        let mut compared = 0;
+        for _ in 0..4000 {
+            let sides = [(); 3].map(|()| 1 + (random(seed) * 6.0) as u32);
+            let [lo, size, origin, direction] = [(); 4].map(|()| [(); 3].map(|()| random(seed))).map(Vec3::from_array);
+            let hi = lo + size + Vec3::splat(0.1);
+            let grid = Grid { lo: lo.to_array(), hi: hi.to_array(), sides };
+            let plan = Plan::new(Voxels::Grid(sides), &Aabb { lo, hi }, &[]);
+            let origin = origin * 3.0 - Vec3::ONE;
+            // Most go through the box, some past it.
+            let direction = lo + (hi - lo) * (1.4 * direction[0]) + (direction - Vec3::splat(0.5)) * 0.3 - origin;
+            let way: Vec<u16> = grid.way(origin, direction).collect();
+            if let Some(crossed) = crossed(&plan, &grid, origin, direction) {
+                assert_eq!(way, crossed, "{grid:?} {origin:?} {direction:?}");
+                compared += usize::from(crossed.len() > 1);
+            }
+            let voxels = plan.voxels() as u16;
+            let [from, to] = [(); 2].map(|()| 1 + (random(seed) * f32::from(voxels)) as u16);
+            let (mut at, mut hops) = (from, Vec::new());
+            while at != to {
+                at = grid.next(origin, direction, at, to);
+                hops.push(at);
+                assert!(hops.len() <= way.len() + 1, "{grid:?} {origin:?} {direction:?}: {hops:?}");
+            }
+            let place = |node| way.iter().position(|&on| on == node);
+            let expected = match (place(from), place(to)) {
+                _ if from == to => Vec::new(),
+                (Some(first), Some(last)) if first < last => way[first + 1..=last].to_vec(),
+                (None, Some(last)) => way[..=last].to_vec(),
+                _ => vec![to],
+            };
+            assert_eq!(hops, expected, "{grid:?} {origin:?} {direction:?} from {from}");
+        }
+        assert!(compared > 1000, "{compared} rays");
+    }
+
+    /// Whatever comes in a record, a way ends.
+    #[test]
+    fn ways_of_no_rays_end() {
+        let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1.0, f32::MIN_POSITIVE, f32::MAX];
+        let grid = Grid { lo: [0.0; 3], hi: [1.0; 3], sides: [4, 3, 2] };
+        for (o, d) in values.iter().flat_map(|&o| values.iter().map(move |&d| (o, d))) {
+            for rest in [-1.0, 0.5, f32::NAN] {
+                let steps = grid.way(Vec3::new(o, 0.5, rest), Vec3::new(d, rest, d)).count();
+                assert!(steps <= 9, "{o} {d}: {steps}");
+            }
         }
     }
 }

@@ -111,9 +111,9 @@ pub(super) struct WorkArgs {
     /// When nodes are given tiles (the report's chapter 3). Default: dynamic
     #[arg(long, value_enum, help_heading = BUDGET)]
     pub tiles: Option<When>,
-    /// Which nodes are given tiles (table 6.2): `all`, `all-but-host` (all but node 1, where the host is), `location` (those
-    /// whose voxel lies at the boundary of the grid), or `objects:N` (those with N objects at most). Default: all; one node
-    /// alone is always given them
+    /// Which nodes are given tiles (table 6.2): `all`, `all-but-host` (all but node 1, where the host is), `location`
+    /// (those whose voxel lies at the boundary of the grid), or `objects:N` (those with N objects at most). Default:
+    /// all; one node alone is always given them
     #[arg(long, value_name = "WHO", value_parser = criterion, help_heading = BUDGET)]
     pub demand_driven: Option<Criterion>,
     /// Nodes that clip pyramids, each for itself and the same number of others (chapter 4, table 6.3): 0 has the host do it
@@ -124,6 +124,11 @@ pub(super) struct WorkArgs {
     /// (chapter 4). Default: on
     #[arg(long, value_enum, help_heading = "Farm (none of these changes the picture)")]
     pub shadow_bundles: Option<Switch>,
+    /// How rays go to the node that has the next page that they meet: straight there, or from voxel to neighbouring
+    /// voxel and on to the end of the grid (the report's data-parallel network, section 6.3). The second wants a grid
+    /// of as many voxels as nodes, and keeps light caches for shadow rays alone. Default: direct
+    #[arg(long, value_enum, help_heading = BUDGET)]
+    pub ways: Option<Ways>,
     /// Whether nodes that have nothing to do at the end of the picture are given some of the others' rays and
     /// tiles; never with --tiles static. Default: on
     #[arg(long, value_enum, help_heading = BUDGET)]
@@ -183,6 +188,9 @@ impl WorkArgs {
                 "--demand-driven is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB"
             );
         }
+        if self.ways.is_some() && memory.is_none() {
+            bail!("--ways is about nodes with a budget, and there is none: give --memory, such as --memory 32MiB");
+        }
         Ok(())
     }
 }
@@ -206,6 +214,14 @@ impl When {
             Self::Static => "static",
         }
     }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Ways {
+    /// Straight to the owner of the page
+    Direct,
+    /// From voxel to voxel
+    Voxels,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -1,10 +1,10 @@
 //! Nodes with a budget, for every command that has them: what fits, and what people are told if it does not.
 
-use super::args::TreeArgs;
-use crate::partition::{Fit, NoFit, Pilot, Voxels, Wanted, barred, page_bytes_for};
+use super::args::{TreeArgs, Ways};
+use crate::partition::{Fit, NoFit, Pilot, Voxels, Wanted, barred, page_bytes_for, square};
 use crate::prepare::Prepared;
 use anyhow::{Result, bail};
-use hybray_scheduler::policy::{Criterion, Policy};
+use hybray_scheduler::policy::{Criterion, Grid, Policy};
 use hybray_scheduler::{PlanError, Sizes};
 use hybray_tracer::Scene;
 
@@ -86,6 +86,25 @@ impl Farm<'_> {
     pub fn barred(&self, criterion: Option<Criterion>, prepared: &Prepared, fit: &Fit) -> Result<Vec<bool>> {
         let objects = prepared.packed.objects_of(&fit.owners, self.nodes);
         Ok(barred(criterion.unwrap_or_default(), self.voxels(), &objects)?)
+    }
+
+    /// The grid that rays go through from voxel to voxel, if they are to.
+    ///
+    /// # Errors
+    /// If the scene is not cut into as many voxels as nodes.
+    pub fn grid(&self, ways: Option<Ways>, scene: &Scene<'_>) -> Result<Option<Grid>> {
+        let voxels = self.voxels();
+        if ways != Some(Ways::Voxels) || self.nodes == 1 {
+            return Ok(None);
+        }
+        if !matches!(voxels, Voxels::Grid(_)) || voxels.count() != u32::from(self.nodes) {
+            let [columns, rows] = square(self.nodes.into());
+            bail!(
+                "nodes have no place in a grid: for --ways voxels give as many voxels as nodes, --voxels \
+                 {columns}x{rows}x1, and a scene that is not packed"
+            );
+        }
+        Ok(voxels.grid(scene))
     }
 
     /// How the scene is cut, as far as that is known.

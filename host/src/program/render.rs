@@ -98,7 +98,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
 
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
-    let (mut fit, mut barred) = (None, Vec::new());
+    let (mut fit, mut barred, mut grid) = (None, Vec::new(), None);
     if let Some(memory) = args.memory {
         let light_cache = args.copies.light_cache;
         let pilot = Pilot::of_policy(policy, &scene, &frame, args.copies.pilot).filter(|_| nodes > 1);
@@ -116,6 +116,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         };
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
         barred = farm.barred(args.work.demand_driven, &prepared, fit)?;
+        grid = farm.grid(args.work.ways, &scene)?;
         show.line(&budget_line(fit, nodes, memory, policy));
     }
     let subject = || prepared.subject(&pages, &frame);
@@ -139,7 +140,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
                 pages: &pages,
                 copies: &fit.copies,
                 parts: &fit.parts,
-                settings,
+                settings: NodeSettings { grid, ..settings },
                 barred: &barred,
             };
             trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?
@@ -266,6 +267,7 @@ fn check_budget(args: &RenderArgs, nodes: u16) -> Result<()> {
         ("--tiles", work.tiles.is_some()),
         ("--demand-driven", work.demand_driven.is_some()),
         ("--subhosts", work.subhosts.is_some()),
+        ("--ways", work.ways.is_some()),
         ("--take-over", work.take_over.is_some()),
     ];
     if let Some((name, _)) = given.iter().find(|(_, given)| *given && args.memory.is_none()) {

@@ -58,7 +58,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     };
     // One node alone has the whole scene.
     let criterion = args.work.demand_driven;
-    let mut voxels = Voxels::One;
+    let (mut voxels, mut grid) = (Voxels::One, None);
     let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
     for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
         let packed = is_packed(&args.scene.scene);
@@ -76,6 +76,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
         };
         if nodes > 1 {
             farm.barred(criterion, &prepared, &farm.fit(&prepared, &scene)?)?;
+            grid = farm.grid(args.work.ways, &scene)?;
         }
         voxels = farm.voxels();
     }
@@ -87,6 +88,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     experiment.light_cache = args.copies.light_cache;
     for (policy, nodes) in farms {
         experiment.settings = args.work.settings(args.machine.settings(policy));
+        experiment.settings.grid = grid.filter(|_| nodes > 1);
         experiment.options = args.work.options(args.spread, args.tile, &experiment.settings);
         let s = if nodes == 1 { "" } else { "s" };
         show.line(&format!("{}, {} with {nodes} node{s}", args.machine.name, name_of(policy)));

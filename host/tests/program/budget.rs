@@ -107,6 +107,8 @@ fn how_nodes_work_changes_no_picture_either() {
         "--nodes 5 --memory 128KiB --subhosts 5",
         "--nodes 4 --memory 128KiB --tiles pixel-count --in-system 64 --demand-driven all-but-host",
         "--nodes 6 --memory 256KiB --voxels 3x2x1 --demand-driven location --scheduler hybrid-1995",
+        "--nodes 6 --memory 256KiB --voxels 3x2x1 --ways voxels --scheduler data-parallel --page-bytes 4096",
+        "--nodes 4 --memory 256KiB --voxels 2x2x1 --ways voxels --light-cache 24KiB --page-bytes 4096",
         "--nodes 8 --memory 1000GiB --kernels portable",
         "--nodes 4 --memory 256KiB --light-cache 24KiB --page-bytes 4096",
         "--nodes 4 --memory 256KiB --light-cache 0 --scheduler hybrid-1995 --page-bytes 4096",
@@ -207,6 +209,7 @@ fn settings_of_budgets_want_one() {
         ("--tiles", "static"),
         ("--demand-driven", "all"),
         ("--subhosts", "0"),
+        ("--ways", "direct"),
         ("--take-over", "off"),
     ] {
         let output = folder.run(&format!("render spd:balls:1 -o a.png {option} {value}"));
@@ -226,6 +229,7 @@ fn settings_of_budgets_want_one() {
         ("--demand-driven", "objects:-1", "objects:500"),
         ("--subhosts", "-1", "--subhosts"),
         ("--take-over", "maybe", "on, off"),
+        ("--ways", "long", "direct, voxels"),
         ("--memory", "0", "such as 32MiB"),
         ("--memory", "99999999999GiB", "such as 32MiB"),
         ("--memory", "12parsecs", "`parsecs` is no unit of memory"),

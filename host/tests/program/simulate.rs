@@ -57,6 +57,7 @@ fn how_nodes_work_changes_the_run_and_not_the_film() {
         "--take-over off",
         "--subhosts 0",
         "--subhosts 2",
+        "--voxels 2x2x1 --ways voxels",
     ] {
         let run = &runs(&folder, &format!("{usual} {more}"))[0];
         assert_eq!(run["film"], first["film"], "{more}");
@@ -141,6 +142,8 @@ fn mistakes() {
     check(&format!("{farm} --tiles pixel-count --dispatcher node"), 1, &["pixel-count", "--dispatcher host"]);
     check(&format!("{farm} --demand-driven location"), 1, &["--demand-driven", "--memory 32MiB"]);
     check(&format!("{farm} --memory 1MiB --demand-driven location"), 1, &["--voxels 2x2x1"]);
+    check(&format!("{farm} --ways voxels"), 1, &["--ways", "--memory 32MiB"]);
+    check(&format!("{farm} --memory 1MiB --voxels 3x1x1 --ways voxels"), 1, &["--ways", "--voxels 2x2x1"]);
     check(
         &format!("{farm} --memory 1MiB --voxels 2x2x1 --demand-driven objects:0"),
         1,

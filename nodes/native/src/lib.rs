@@ -146,6 +146,9 @@ pub fn trace_within(
         let copies = budget.copies.get(usize::from(peer) - 1).filter(|_| !plan.holds_all);
         for &page in copies.into_iter().flatten() {
             assert!(cache.put(page, budget.pages[page as usize]), "page {page} is none");
+            if budget.settings.grid.is_some() {
+                cache.for_shadows(page);
+            }
         }
         let settings = Settings { shadow_bundles: farm.shadow_bundles, ..budget.settings };
         let settings = plan.settings(settings);

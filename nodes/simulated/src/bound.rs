@@ -91,6 +91,10 @@ impl Bound {
         let quiet_round_ns = round_ns(turn_ns(quiet_ps));
         // A node that has every page waits for none. A ray that has its hit may wait for that page once more.
         let pages = if plan.holds_all { 0 } else { limits.pages as u128 };
+        // From voxel to voxel it comes to each page, and once more to its way's end, over as many nodes as the grid has
+        // voxels along its axes.
+        let hops = settings.grid.map_or(1, |grid| grid.sides.iter().map(|&side| u128::from(side)).sum());
+        let pages = pages + u128::from(settings.grid.is_some() && pages > 0);
         let steps = (pages + 1) * walks.chain + 1;
         // Pages that are asked for have places, and a peer is asked for so many at a time; the lane's goes before the others.
         let open = usize::from(settings.requests).clamp(1, REQUESTS_MAX).min(plan.places.saturating_sub(1)).max(1);
@@ -103,7 +107,7 @@ impl Bound {
         let sent =
             limits.rays.div_ceil(usize::from(settings.granularity).clamp(1, BODY_BYTES_MAX / size_of::<RayRecord>()));
         let sums = limits.partials.clamp(1, BODY_BYTES_MAX / size_of::<Partial>()) as u128;
-        let in_pool = steps * (2 * turn + 2 * sent as u128 + 1) + rays.div_ceil(sums);
+        let in_pool = steps * hops * (2 * turn + 2 * sent as u128 + 1) + rays.div_ceil(sums);
         // The lane stands still: a round until its page can be asked for, and one until it comes.
         let in_lane = (u128::from(frame.depth_max) + 1) * steps * 2;
         let rounds = if pages == 0 { 1 } else { in_pool + in_lane };

@@ -55,6 +55,9 @@ impl<'s> Worker<'s> {
         let copies = copies.get(usize::from(me) - 1).filter(|_| !plan.holds_all);
         for &page in copies.into_iter().flatten() {
             cache.put(page, scene.resident.directory.entries[page as usize].bytes as usize);
+            if settings.grid.is_some() {
+                cache.for_shadows(page);
+            }
         }
         let settings = plan.settings(settings);
         let node = Node::new(scene, cache, scene_hash, Kernels::Portable, me, dispatcher, settings, memory);

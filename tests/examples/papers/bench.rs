@@ -28,6 +28,8 @@ pub struct Job {
     pub page_bytes: usize,
     /// Columns and rows.
     pub size: [u32; 2],
+    /// Rays go from voxel to voxel, as in the report's data-parallel network.
+    pub walks: bool,
     /// Samples a pixel.
     pub samples: u32,
     /// The machine.
@@ -76,6 +78,7 @@ impl Job {
             voxels: "1".to_owned(),
             page_bytes: Build::default().page_bytes,
             size: [256, 256],
+            walks: false,
             samples: 1,
             machine: "powerxplorer",
             nodes,
@@ -109,10 +112,15 @@ impl Job {
         Self { policy, voxels: format!("{grid}x1"), granularity: Some(100), in_system, bundle_tiles: Some(4), ..self }
     }
 
+    /// The same with the report's data-parallel network: rays go from voxel to voxel, and shadow rays nowhere.
+    pub fn walking(self) -> Self {
+        Self { walks: true, light_cache: Some(1 << 40), ..self }
+    }
+
     /// One node with the same constants and unlimited memory (DESIGN section 12).
     fn alone(&self) -> Self {
         let same = Self { tiles: Tiles::Dynamic, criterion: Criterion::All, take_over: true, ..self.clone() };
-        let same = Self { subhosts: None, pilot: PILOT_RAYS, shadow_bundles: true, ..same };
+        let same = Self { subhosts: None, walks: false, pilot: PILOT_RAYS, shadow_bundles: true, ..same };
         Self { nodes: 1, policy: Policy::Hybrid, memory_mib: None, share: None, light_cache: None, ..same }
     }
 }
@@ -320,6 +328,7 @@ fn made(job: &Job, prepared: &Prepared) -> Found {
         bundle_tiles: job.bundle_tiles.unwrap_or(settings.bundle_tiles),
         shadow_bundles: job.shadow_bundles,
         subhosts: job.subhosts,
+        grid: job.walks.then(|| experiment.voxels.grid(&scene)).flatten(),
         ..settings
     };
     let scene_bytes = Sizes::of(&scene).pages_bytes;

@@ -161,15 +161,23 @@ pub fn light_cache(bench: &Bench, published: &Published) -> Result<String> {
 
 /// Table 6.7: data parallel alone.
 pub fn data_parallel(bench: &Bench, published: &Published) -> Result<String> {
-    let groups = ["`data-parallel`, 100 rays a message", "`data-parallel`, 1 ray a message", "`hybrid`"];
+    let groups = [
+        "`data-parallel` from voxel to voxel, 1 ray a message",
+        "the same, 100 rays a message",
+        "`data-parallel`, 1 ray a message",
+        "`data-parallel`, 100 rays a message",
+        "`hybrid`",
+    ];
     let mut table = table(&["nodes", "paper: s", "busy %"], &groups);
     for row in published.table("t6_7_data_parallel")? {
         let mut line = columns(row, &["processors", "s", "eff"])?;
         let job = Job::of_1995("paper:balls", row.number("processors")?);
-        let published = job.clone().in_1995(Policy::DataParallel, row.text("grid")?);
-        for job in [published.clone(), Job { granularity: Some(1), ..published }, job] {
-            line.extend(run(bench, &job));
+        let direct = job.clone().in_1995(Policy::DataParallel, row.text("grid")?);
+        for published in [direct.clone().walking(), direct] {
+            line.extend(run(bench, &Job { granularity: Some(1), ..published.clone() }));
+            line.extend(run(bench, &published));
         }
+        line.extend(run(bench, &job));
         table.row(line);
     }
     Ok(table.finish())
@@ -178,14 +186,18 @@ pub fn data_parallel(bench: &Bench, published: &Published) -> Result<String> {
 /// Table 6.8: how much of the balls reflects.
 pub fn reflectivity(bench: &Bench, published: &Published) -> Result<String> {
     let first = ["level", "hybrid of 1995: s", "busy %", "data parallel: s", "busy %"];
-    let mut table = table(&first, &["`hybrid-1995`", "`data-parallel`", "`hybrid`"]);
+    let mut table = table(
+        &first,
+        &["`hybrid-1995`", "`data-parallel` from voxel to voxel, 1 ray a message", "`data-parallel`", "`hybrid`"],
+    );
     for row in published.table("t6_8_reflectivity")? {
         let mut line = columns(row, &["level", "hybrid_s", "hybrid_eff", "data_parallel_s", "data_parallel_eff"])?;
         let job = Job::of_1995(&format!("paper:balls:{}", row.text("level")?), 16);
-        for policy in [Policy::Hybrid1995, Policy::DataParallel] {
-            line.extend(run(bench, &job.clone().in_1995(policy, "4x4")));
+        let direct = job.clone().in_1995(Policy::DataParallel, "4x4");
+        let walks = Job { granularity: Some(1), ..direct.clone().walking() };
+        for job in [job.clone().in_1995(Policy::Hybrid1995, "4x4"), walks, direct, job] {
+            line.extend(run(bench, &job));
         }
-        line.extend(run(bench, &job));
         table.row(line);
     }
     Ok(table.finish())

@@ -57,15 +57,19 @@ pub fn goals(bench: &Bench, published: &Published) -> Result<String> {
 fn flat(bench: &Bench, published: &Published) -> Result<String> {
     let rows = published.table("t6_7_data_parallel")?;
     let mut names = vec!["`data-parallel`, balls: s on so many nodes".to_owned()];
-    let mut lines =
-        [vec!["published".to_owned()], vec!["100 rays a message".to_owned()], vec!["1 ray a message".to_owned()]];
+    let ways = ["from voxel to voxel, 1 ray a message", "the same, 100 rays a message"]
+        .into_iter()
+        .chain(["straight to the page, 1 ray a message", "the same, 100 rays a message"]);
+    let mut lines: Vec<_> = std::iter::once("published").chain(ways).map(|name| vec![name.to_owned()]).collect();
     for row in rows {
         names.push(row.cell("processors")?);
         lines[0].push(row.cell("s")?);
         let job = Job::of_1995("paper:balls", row.number("processors")?);
-        let job = job.in_1995(Policy::DataParallel, row.text("grid")?);
-        for (line, granularity) in lines[1..].iter_mut().zip([100, 1]) {
-            let found = bench.figures(&Job { granularity: Some(granularity), ..job.clone() });
+        let direct = job.in_1995(Policy::DataParallel, row.text("grid")?);
+        let jobs = [direct.clone().walking(), direct];
+        let jobs = jobs.iter().flat_map(|job| [1, 100].map(|most| Job { granularity: Some(most), ..job.clone() }));
+        for (line, job) in lines[1..].iter_mut().zip(jobs) {
+            let found = bench.figures(&job);
             line.push(found.map_or_else(|without| without.cell(), |run| format!("{:.2}", run.seconds)));
         }
     }

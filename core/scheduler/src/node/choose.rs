@@ -2,6 +2,7 @@
 //! a node that has none.
 
 use super::memory::Bundle;
+use super::way::Way;
 use super::{Back, DECISIONS, Node, PeerState, REQUESTS_MAX, Request, Stage, Store, at_hand, primary};
 use crate::policy::{Choice, Situation, decide};
 use crate::rules;
@@ -98,7 +99,7 @@ impl<P: Store> Node<'_, '_, P> {
             self.looked_at = next.unwrap_or(FROM_ROOT);
         }
         // The next bundle's pages once, when no ray is left that waits for one that was not asked for.
-        if !self.ahead.tried && self.memory.pool.first_wanted().is_none() {
+        if !self.ahead.tried && self.settings.grid.is_none() && self.memory.pool.first_wanted().is_none() {
             self.ahead.tried = true;
             for at in 0..self.ahead.pages().len() {
                 let page = self.ahead.pages()[at];
@@ -113,16 +114,17 @@ impl<P: Store> Node<'_, '_, P> {
     fn settle(&mut self, page: u32, has_room: bool, load: u32, now: u64) -> bool {
         let entry = self.scene.resident.directory.entries[page as usize];
         let uses = u32::from(self.memory.pool.page(page).uses);
-        let Some(oldest) = self.memory.pool.oldest(page) else { return false };
+        let Some(oldest) = self.memory.pool.oldest(page).copied() else { return false };
         let (kind, moved) = (oldest.ray_kind(), oldest.moved == 1);
-        let owner = self.memory.peers.get(entry.owner).copied().unwrap_or(PeerState::LOST);
+        let to = self.toward(&oldest, entry.owner);
+        let owner = self.memory.peers.get(to).copied().unwrap_or(PeerState::LOST);
         let situation = Situation {
             rays: self.memory.pool.waiting(page) as u32,
             kind,
             page_bytes: entry.bytes,
             uses,
             owner_is_full: owner.full,
-            owner_traces: !owner.lost && entry.owner != HOST && entry.owner != self.me,
+            owner_traces: !owner.lost && to != HOST && to != self.me,
             outbox: owner.outbox.len() as u32,
             owner_load: u32::from(owner.load),
             load,
@@ -136,19 +138,47 @@ impl<P: Store> Node<'_, '_, P> {
             return true;
         }
         // No place for the page: if its owner had no room either, it is asked once more.
-        let goes = choice == Choice::Forward || rules::goes_again(moved, owner.full, situation.owner_traces);
-        if goes {
-            let outbox = self.memory.peers.send(entry.owner, now);
+        let goes = choice == Choice::Forward
+            || (self.settings.grid.is_none() && rules::goes_again(moved, owner.full, situation.owner_traces));
+        if goes && self.settings.grid.is_some() {
+            self.disperse(page, entry.owner, now);
+        } else if goes {
+            let outbox = self.memory.peers.send(to, now);
             self.memory.pool.move_to(page, outbox);
         }
         goes
+    }
+
+    /// Who `ray` is sent to, on its way to a page of `owner`: from voxel to voxel, as far as they are there.
+    fn toward(&mut self, ray: &RayRecord, owner: Peer) -> Peer {
+        let Some(grid) = self.settings.grid else { return owner };
+        let next = Way { grid, me: self.me, entries: &[] }.next(ray, owner);
+        if next == HOST || self.memory.peers.get(next).is_none_or(|peer| peer.lost) { owner } else { next }
+    }
+
+    /// Sends each of the rays that wait for a page of `owner` on its own way. Those that would go to a full node stay:
+    /// at least the oldest goes.
+    fn disperse(&mut self, page: u32, owner: Peer, now: u64) {
+        let mut rays = List::EMPTY;
+        self.memory.pool.move_to(page, &mut rays);
+        while let Some(ray) = self.memory.pool.pop(&mut rays) {
+            let to = self.toward(&ray, owner);
+            let goes = self.memory.peers.get(to).is_some_and(|peer| !peer.full && !peer.lost);
+            // Its place was free this moment.
+            let _ = if goes {
+                let outbox = self.memory.peers.send(to, now);
+                self.memory.pool.push_to(outbox, ray)
+            } else {
+                self.memory.pool.push(ray, false)
+            };
+        }
     }
 
     /// Has rays that were to go elsewhere wait here again; `moved` if they were there, and have had their move. Their places
     /// were free this moment, so there is room.
     pub(super) fn wait_again(&mut self, mut list: List, moved: bool) {
         while let Some(ray) = self.memory.pool.pop(&mut list) {
-            let here = self.store.page(ray.page).is_some();
+            let here = self.store.nearest(ray.page).is_some();
             let _ = self.memory.pool.push(RayRecord { moved: ray.moved | u8::from(moved), ..ray }, here);
         }
     }
@@ -157,6 +187,10 @@ impl<P: Store> Node<'_, '_, P> {
     fn request(&mut self, page: u32, for_lane: bool) -> bool {
         if let Some(at) = self.requests.iter().position(|r| r.page == page) {
             self.requests[..=at].rotate_right(usize::from(for_lane));
+            return true;
+        }
+        if self.store.open(page) {
+            self.memory.pool.landed(page);
             return true;
         }
         let requests = usize::from(self.settings.requests).clamp(1, REQUESTS_MAX);

@@ -74,9 +74,10 @@ impl<P: Store> Node<'_, '_, P> {
                 continue;
             }
             self.traffic.arrived += 1;
-            let shared = ray.moved == 1 || (ray.settled == 1 && ray.kind == RayKind::Primary as u8);
+            let shared = ray.moved == 1
+                || (ray.settled == 1 && ray.kind == RayKind::Primary as u8 && ray.primitive != Candidate::NOTHING);
             self.helped |= rules::was_helped(true, shared);
-            let here = self.store.page(ray.page).is_some();
+            let here = self.store.nearest(ray.page).is_some();
             // There is room for all of them.
             let _ = self.memory.pool.push(ray, here);
         }

@@ -17,6 +17,7 @@ mod picture;
 mod pool;
 mod store;
 mod tiles;
+mod way;
 
 pub use memory::{Limits, NodeMemory};
 pub use picture::can_draw;
@@ -26,7 +27,7 @@ pub(crate) use ahead::clip;
 pub(crate) use peers::{PeerState, Peers};
 pub(crate) use picture::Picture;
 
-use crate::policy::{LinkCost, Policy, subhost};
+use crate::policy::{Grid, LinkCost, Policy, subhost};
 use crate::{rules, send};
 use ahead::Ahead;
 use hybray_bintree::walk::{FROM_ROOT, Hit};
@@ -36,10 +37,11 @@ use hybray_link::{HOST, Link, Peer};
 use hybray_pyraclip::wide;
 use hybray_scene::Pages;
 use hybray_shading::{id, sample_offset};
-use hybray_tracer::{Lane, Scene, Walker, goes_together};
+use hybray_tracer::{Beyond, Lane, Scene, Walker, goes_together};
 use hybray_wire::{Counts, Message, RayKind, RayRecord, TILE, View};
 use memory::Bundle;
 use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
+use way::{Nothing, Way};
 
 /// Tiles of a bundle.
 const TILES: usize = 4;
@@ -56,7 +58,7 @@ const DECISIONS: usize = 32;
 pub const DEPTH_MAX: usize = 64;
 
 /// What may be chosen about a node. None of it changes a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Forward or fetch.
     pub policy: Policy,
@@ -83,6 +85,9 @@ pub struct Settings {
     /// Nodes that clip bundles for themselves and as many others (table 6.3); with none the host does, and every node does
     /// if nothing is said.
     pub subhosts: Option<Peer>,
+    /// Rays go from voxel to neighbouring voxel of this grid, and on to its end if they hit nothing, instead of
+    /// straight to the next page that they meet: the report's data-parallel network.
+    pub grid: Option<Grid>,
 }
 
 impl Default for Settings {
@@ -100,6 +105,7 @@ impl Default for Settings {
             lights_first: false,
             shadow_bundles: true,
             subhosts: None,
+            grid: None,
         }
     }
 }
@@ -268,6 +274,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     ) -> Self {
         // Where every page is at hand, nothing is clipped for.
         let clips = |nodes: usize| subhost(me, nodes as Peer, settings.subhosts);
+        let settings = Settings { grid: settings.grid.filter(|_| memory.pool.capacity() > 0), ..settings };
         let subhost = memory.peers.len().checked_sub(1).map(clips).filter(|&subhost| subhost != me);
         Self {
             scene,
@@ -438,7 +445,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     /// there was anything to do. `clock` is asked before and after.
     pub fn step(&mut self, clock: &mut dyn FnMut() -> u64) -> bool {
         let (before, done) = (clock(), self.done.len());
-        let worked = self.work();
+        let worked = self.work(before);
         self.idle = !worked;
         if worked {
             let spent = clock().saturating_sub(before);
@@ -451,14 +458,17 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         worked
     }
 
-    fn work(&mut self) -> bool {
+    fn work(&mut self, now: u64) -> bool {
         let Some(picture) = &self.picture else { return false };
         let frame = &picture.frame;
-        let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, .. } = &mut self.memory;
+        let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, peers, .. } = &mut self.memory;
         let Bundle { rays, walked, places, lit, together, stack } = &mut **bundle;
         let scene = self.scene.at_hand(&self.store);
         let Settings { lights_first: past, shadow_bundles: bundles, .. } = self.settings;
-        let mut walker = Walker { past, bundles, ..Walker::new(self.kernels, stack, together) };
+        let way = self.settings.grid.map(|grid| Way { grid, me: self.me, entries: scene.resident.directory.entries });
+        let beyond = way.as_ref().map(|way| |ray: &RayRecord| way.beyond(ray, &scene));
+        let beyond = beyond.as_ref().map(|beyond| beyond as Beyond<'_>);
+        let mut walker = Walker { past, bundles, beyond, ..Walker::new(self.kernels, stack, together) };
         // As many as a bundle may have are lit at once; none where nothing would go together.
         let shadows = scene.shading.shadow_rays.min(64);
         let lit = if bundles && (0..shadows).any(|c| goes_together(&scene, c)) { &mut lit[..] } else { &mut [] };
@@ -543,9 +553,15 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     let hit = went.best.candidate.is_hit() && !at_hand(&scene, went.best.page);
                     let waits = match went.needs {
                         Some(page) => Some(RayRecord { page, ..ray }),
-                        None => hit.then_some(RayRecord { page: went.best.page, settled: 1, ..ray }),
+                        None if hit => Some(RayRecord { page: went.best.page, settled: 1, ..ray }),
+                        None if went.best.candidate.is_hit() => None,
+                        None => {
+                            let last = way.as_ref().and_then(|way| way.last(&ray, &scene));
+                            last.map(|page| RayRecord { page, settled: 1, ..ray })
+                        }
                     };
                     match waits {
+                        Some(ray) if way.as_ref().is_some_and(|way| way.begin(&ray, pool, peers, now)) => {}
                         Some(ray) => self.aside = pool.push(ray, at_hand(&scene, ray.page)).err(),
                         None => match hybray_tracer::begin(&scene, &ray, &went.best, &mut sums, &mut counts) {
                             Some(record) if lit.is_empty() => lane.push(record),
@@ -566,7 +582,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     bundles += 1;
                     let count = self.in_work.rays;
                     start_sample(picture, sample + 1, &places[..count], &mut rays[..count]);
-                    trace_bundle(&scene, &rays[..count], walked, &mut walker);
+                    match &way {
+                        None => trace_bundle(&scene, &rays[..count], walked, &mut walker),
+                        Some(_) => trace_bundle(&scene.at_hand(&Nothing), &rays[..count], walked, &mut walker),
+                    }
                     counts.primary += count as u64;
                     self.stage = Stage::Shading { sample: sample + 1, next: 0, end: count };
                 }
@@ -634,7 +653,10 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                         );
                     }
                     start_sample(picture, 0, &places[..count], &mut rays[..count]);
-                    trace_bundle(&scene, &rays[..count], walked, &mut walker);
+                    match &way {
+                        None => trace_bundle(&scene, &rays[..count], walked, &mut walker),
+                        Some(_) => trace_bundle(&scene.at_hand(&Nothing), &rays[..count], walked, &mut walker),
+                    }
                     counts.primary += count as u64;
                     self.stage = Stage::Shading { sample: 0, next: 0, end: count };
                 }
@@ -733,7 +755,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
 
 /// Whether a ray that needs `page` can go on here.
 fn at_hand<P: Pages + ?Sized>(scene: &Scene<'_, P>, page: u32) -> bool {
-    page == FROM_ROOT || scene.resident.pages.page(page).is_some()
+    page == FROM_ROOT || scene.resident.pages.nearest(page).is_some()
 }
 
 /// The primary rays of one sample.

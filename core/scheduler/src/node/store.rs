@@ -17,6 +17,9 @@ pub trait Store: Pages {
     /// place that is kept for it.
     fn reserve(&mut self, page: u32, for_lane: bool, keep: &dyn Fn(u32) -> bool) -> bool;
 
+    /// Lets all rays have a page that was here for shadow rays alone; false if it is none.
+    fn open(&mut self, page: u32) -> bool;
+
     /// Puts a part of `page` into its place.
     fn land(&mut self, page: u32, offset: usize, part: &[u8]) -> Landed;
 
@@ -51,6 +54,9 @@ impl Store for All<'_> {
         None
     }
     fn reserve(&mut self, _: u32, _: bool, _: &dyn Fn(u32) -> bool) -> bool {
+        false
+    }
+    fn open(&mut self, _: u32) -> bool {
         false
     }
     fn land(&mut self, _: u32, _: usize, _: &[u8]) -> Landed {
@@ -153,6 +159,8 @@ const NOWHERE: u32 = u32::MAX;
 const WHOLE: u32 = u32::MAX;
 /// Tag of pages in the cache: the rest is the number of the place. Of others, the rest is their first line.
 const CACHED: u32 = 1 << 31;
+/// Tag of pages that shadow rays alone may have.
+const SHADOWS: u32 = 1 << 30;
 
 /// Pages that a node owns (or was given in advance), packed one behind the other, and behind them a cache of places of
 /// equal size.
@@ -207,11 +215,20 @@ impl<'m, B: Backing> Cache<'m, B> {
             return None;
         }
         if at & CACHED == 0 {
-            return Some(at as usize);
+            return Some((at & !SHADOWS) as usize);
         }
         let place = (at & !CACHED) as usize;
         self.places[place].used.set(true);
         (self.places[place].landed == WHOLE).then(|| self.line(place))
+    }
+
+    /// Keeps a page that was put here for shadow rays alone: other rays go where it is owned.
+    pub fn for_shadows(&mut self, page: u32) {
+        self.at[page as usize] |= SHADOWS;
+    }
+
+    fn is_for_shadows(&self, page: u32) -> bool {
+        self.at.get(page as usize).is_some_and(|at| at & (CACHED | SHADOWS) == SHADOWS)
     }
 
     fn free(&mut self, place: usize) {
@@ -247,6 +264,11 @@ impl<B: Backing> Pages for Cache<'_, B> {
     #[inline(always)]
     fn page(&self, number: u32) -> Option<PageView<'_>> {
         self.line_of(number).map(|line| self.backing.view(number, line))
+    }
+
+    #[inline(always)]
+    fn nearest(&self, number: u32) -> Option<PageView<'_>> {
+        if self.is_for_shadows(number) { None } else { self.page(number) }
     }
 
     fn parents(&self) -> &[u32] {
@@ -289,6 +311,14 @@ impl<B: Backing> Store for Cache<'_, B> {
         self.at[page as usize] = CACHED | place as u32;
         self.held += u64::from(size);
         true
+    }
+
+    fn open(&mut self, page: u32) -> bool {
+        let opens = self.is_for_shadows(page);
+        if opens {
+            self.at[page as usize] &= !SHADOWS;
+        }
+        opens
     }
 
     fn land(&mut self, page: u32, offset: usize, part: &[u8]) -> Landed {

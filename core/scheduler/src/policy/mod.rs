@@ -3,12 +3,14 @@
 mod criterion;
 mod data_parallel;
 mod demand_driven;
+mod grid;
 mod hybrid;
 mod hybrid_1995;
 mod subhosts;
 mod tiles;
 
 pub use criterion::{Candidate, Criterion, admits};
+pub use grid::Grid;
 pub use subhosts::subhost;
 pub use tiles::{Hand, Tiles, gives, missing};
 
