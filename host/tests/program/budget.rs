@@ -95,7 +95,9 @@ fn how_nodes_work_changes_no_picture_either() {
     let film = json(&folder, usual)["film"].clone();
     for more in [
         "--nodes 1 --memory 1MiB",
-        "--nodes 3 --memory 112KiB --dispatcher node",
+        "--nodes 3 --memory 120KiB --dispatcher node",
+        "--nodes 2 --shadow-bundles off",
+        "--nodes 4 --memory 128KiB --shadow-bundles off",
         "--nodes 4 --memory 128KiB --granularity 1",
         "--nodes 4 --memory 128KiB --granularity 186 --scheduler data-parallel",
         "--nodes 4 --memory 128KiB --in-system 1",
