@@ -14,6 +14,8 @@ use hybray_simulated::{Machine, NodeRun, Simulated};
 use hybray_tests::scene;
 use rayon::prelude::*;
 
+use crate::appendix_a::{self, Measured};
+
 /// A run that is watched so often for each tile and sample without coming to its end never comes to it: then it failed.
 const TURNS_MAX: u64 = 3000;
 
@@ -225,6 +227,9 @@ pub struct Bench {
     is_small: bool,
     wanted: RefCell<Vec<Job>>,
     known: Vec<(Job, Found)>,
+    /// Appendix A's scenes: wanted, and seen.
+    to_measure: RefCell<Vec<appendix_a::Job>>,
+    measured: Vec<(appendix_a::Job, Result<Measured, String>)>,
 }
 
 impl Bench {
@@ -258,6 +263,15 @@ impl Bench {
         })
     }
 
+    /// What became of a scene of appendix A; notes it if that is not known yet. `None` if there is nothing.
+    pub fn measured(&self, job: &appendix_a::Job) -> Option<&Measured> {
+        let known = self.measured.iter().find(|(known, _)| known == job);
+        if known.is_none() && !self.to_measure.borrow().contains(job) {
+            self.to_measure.borrow_mut().push(job.clone());
+        }
+        known?.1.as_ref().ok()
+    }
+
     /// Makes all runs that are wanted. Those of a scene that is cut in the same way share its pages.
     pub fn run(&mut self) {
         let mut scenes: BTreeMap<_, Vec<Job>> = BTreeMap::new();
@@ -270,6 +284,11 @@ impl Bench {
         let scenes: Vec<_> = scenes.into_values().collect();
         let found: Vec<_> = scenes.into_par_iter().flat_map_iter(|jobs| of_scene(&jobs)).collect();
         self.known.extend(found);
+        // One after the other: some are timed.
+        for job in self.to_measure.take() {
+            let found = appendix_a::measure(&if self.is_small { job.small() } else { job.clone() });
+            self.measured.push((job, found));
+        }
     }
 
     /// How many runs there are.
@@ -296,6 +315,8 @@ impl Bench {
                 Err(_) => {}
             }
         }
+        let failed = self.measured.iter().filter_map(|(job, found)| Some((job, found.as_ref().err()?)));
+        wrong.extend(failed.map(|(job, why)| format!("{why}: {}", job.scene)));
         wrong
     }
 }

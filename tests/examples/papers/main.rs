@@ -2,9 +2,10 @@
 //!
 //! The page is written by hand but for its tables: between `<!-- table NAME -->` and `<!-- end -->` stands what this
 //! program put there. Published figures are read from `docs/paper-tables`. Times are virtual, so that the page is the same
-//! on every computer; nothing reads a clock. `cargo xtask papers` runs it.
+//! on every computer; nothing reads a clock but `A-times`, which is made when it is asked for. `cargo xtask papers` runs it.
 #![forbid(unsafe_code)]
 
+mod appendix_a;
 mod bench;
 mod chapter_6;
 mod page;
@@ -48,7 +49,7 @@ const fn table(name: &'static str, block: Block) -> Experiment {
     Experiment { name, is_long: false, block }
 }
 
-const EXPERIMENTS: [Experiment; 13] = [
+const EXPERIMENTS: [Experiment; 16] = [
     table("reach", reach::goals),
     Experiment { name: "thousand", is_long: true, block: reach::thousand },
     table("mechanisms", reach::mechanisms),
@@ -61,6 +62,9 @@ const EXPERIMENTS: [Experiment; 13] = [
     table("6.8", chapter_6::reflectivity),
     table("6.9-balls5", chapter_6::balls5),
     table("6.9-conference", chapter_6::conference),
+    table("A.9", appendix_a::pyramid_size),
+    table("A.11", appendix_a::primitives),
+    Experiment { name: "A-times", is_long: true, block: appendix_a::times },
     table("pov", pov::speed_up),
 ];
 
