@@ -62,6 +62,15 @@ pub struct NodeReport {
     pub busy_nanoseconds: u64,
 }
 
+impl NodeReport {
+    /// Whether the node was ever heard of: a picture that is whole does not wait for one that was not, and does not know
+    /// what it did for others.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.greeted
+    }
+}
+
 /// The machine. `nodes` has one entry for each peer, the host's (unused) included.
 pub struct Master<'m> {
     frame: Frame,

@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(Quantity::Bytes.show(33554432.0), "32.0\u{a0}MiB");
         assert_eq!(Quantity::Bytes.show(12.0), "12.0 B");
         assert_eq!(Quantity::Seconds.show(0.00025), "250\u{a0}µs");
-        assert_eq!(Quantity::Seconds.show(3599.0), "3599\u{a0}s");
+        assert_eq!(Quantity::Seconds.show(3599.0), "3,599\u{a0}s");
         assert_eq!(Quantity::Seconds.show(5400.0), "1.50\u{a0}h");
         assert_eq!(Quantity::Seconds.show(4.48e8), "14.2\u{a0}years");
         assert_eq!(Quantity::Share.show(0.8), "80.0\u{a0}%");

@@ -27,7 +27,7 @@ impl Floor {
 }
 
 struct Goal {
-    case: &'static str,
+    case: String,
     published: String,
     floor: Floor,
     job: Job,
@@ -43,7 +43,7 @@ pub fn goals(bench: &Bench, published: &Published) -> Result<String> {
         for is_dispatched_by_node in [false, true] {
             let dispatcher = if is_dispatched_by_node { "node" } else { "host" };
             let job = Job { is_dispatched_by_node, ..goal.job.clone() };
-            let mut line = vec![goal.case.to_owned(), goal.published.clone(), goal.floor.text(), dispatcher.to_owned()];
+            let mut line = vec![goal.case.clone(), goal.published.clone(), goal.floor.text(), dispatcher.to_owned()];
             line.extend(figures(bench, &job, &goal.floor));
             let option = if is_dispatched_by_node { " --dispatcher node" } else { "" };
             line.push(format!("`{}{option}`", goal.command));
@@ -118,15 +118,27 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
     let simulate = |scene: &str, nodes: u16| {
         format!("hybray simulate {scene} --machine powerxplorer --nodes {nodes} --memory 32MiB --spp 1")
     };
-    let farm = |scene: &str| format!("hybray simulate {scene} --machine cc48 --nodes 38 --spp 1");
+    // With memory for all pages, nodes share the rays of the last tiles; without a budget a tile is the least that is given.
+    let pov = |case: &str, scene: &str, published: String, least: f64, memory_mib: Option<u64>| {
+        let (with, option) = memory_mib.map_or_else(Default::default, |mib| {
+            (format!(", {mib} MiB a node"), format!(" --memory {mib}MiB"))
+        });
+        Goal {
+            case: format!("POV||Ray's farm, 38 workers, {case}{with}"),
+            published,
+            floor: Floor::Times(least),
+            job: Job { memory_mib, ..pov::job(scene, 38) },
+            command: format!("hybray simulate {scene} --machine cc48 --nodes 38{option} --spp 1"),
+        }
+    };
     let part = |scene: &str, share: u64| {
         let pages = format!("--page-memory 1/{share} --page-bytes 4096");
         format!("hybray simulate {scene} --machine powerxplorer --nodes 32 --memory 32MiB {pages} --spp 1")
     };
-    let level = |level: &'static str, case: &'static str| -> Result<Goal> {
+    let level = |level: &'static str, case: &str| -> Result<Goal> {
         let scene = format!("paper:balls:{level}");
         Ok(Goal {
-            case,
+            case: case.to_owned(),
             published: seconds(row("t6_8_reflectivity", "level", level)?, "hybrid_s")?,
             floor: Floor::Efficiency(0.85, None),
             job: Job::of_1995(&scene, 16),
@@ -142,7 +154,7 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
     };
     Ok(vec![
         Goal {
-            case: "balls, 32 nodes",
+            case: "balls, 32 nodes".to_owned(),
             published: format!("{} s, busy {} %", balls.cell("subhosts_s")?, balls.cell("subhosts_eff")?),
             floor: Floor::Efficiency(0.8, Some(2.4)),
             job: Job::of_1995("paper:balls", 32),
@@ -151,33 +163,23 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
         level("1", "balls, every sphere reflective, 16 nodes")?,
         level("6", "balls, no sphere reflective, 16 nodes")?,
         Goal {
-            case: "balls of 66,430 spheres, page memory a sixteenth of the scene, 32 nodes",
+            case: "balls of 66,430 spheres, page memory a sixteenth of the scene, 32 nodes".to_owned(),
             published: seconds(large, "balls5_hybrid_s")?,
             floor: Floor::Efficiency(0.7, None),
             job: Job::of_1995("paper:balls5", 32).with_share(16),
             command: part("paper:balls5", 16),
         },
         Goal {
-            case: "conference room, 30 lights, page memory a quarter of the scene, 32 nodes",
+            case: "conference room, 30 lights, page memory a quarter of the scene, 32 nodes".to_owned(),
             published: seconds(large, "conference30_hybrid_s")?,
             floor: Floor::Efficiency(0.7, None),
             job: Job::of_1995("paper:conference:30", 32).with_share(4),
             command: part("paper:conference:30", 4),
         },
-        Goal {
-            case: "POV||Ray's farm, 38 workers, courtyard",
-            published: workers("rosenthalerhof", "t2_speedup")?,
-            floor: Floor::Times(37.0),
-            job: pov::job("paper:hof", 38),
-            command: farm("paper:hof"),
-        },
-        Goal {
-            case: "POV||Ray's farm, 38 workers, vase",
-            published: workers("skyvase", "t3_speedup")?,
-            floor: Floor::Times(34.0),
-            job: pov::job("paper:vase", 38),
-            command: farm("paper:vase"),
-        },
+        pov("courtyard", "paper:hof", workers("rosenthalerhof", "t2_speedup")?, 37.0, None),
+        pov("courtyard", "paper:hof", workers("rosenthalerhof", "t2_speedup")?, 37.0, Some(64)),
+        pov("vase", "paper:vase", workers("skyvase", "t3_speedup")?, 34.0, None),
+        pov("vase", "paper:vase", workers("skyvase", "t3_speedup")?, 34.0, Some(64)),
     ])
 }
 
