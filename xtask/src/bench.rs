@@ -14,6 +14,7 @@ mod plot;
 mod povray;
 mod scale;
 mod table;
+mod tachyon;
 mod threads;
 
 use std::fs;
@@ -32,7 +33,7 @@ use crate::workspace::Workspace;
 /// One benchmark.
 #[derive(Subcommand)]
 pub enum Bench {
-    /// Hybray against POV-Ray: the same scenes, threads and depth; times, rays, and how far the pictures agree
+    /// Hybray against POV-Ray and Tachyon: the same scenes, threads and depth; times, rays, and how far the pictures agree
     Pictures(pictures::Options),
     /// One node against two: time, and how busy each was
     Threads(threads::Options),
@@ -156,7 +157,7 @@ mod tests {
         if pictures::skip().is_some() {
             return;
         }
-        let options = pictures::Options { threads: 1, runs: 1, pin: false, common: small() };
+        let options = pictures::Options { threads: vec![1], runs: 1, pin: false, common: small() };
         check(&pictures::run(&bed, &options).unwrap(), &["spd:balls:2"]);
     }
 

@@ -36,6 +36,14 @@ impl Pixels {
         Ok(Self { width: info.width, height: info.height, rgb: rgb.to_vec() })
     }
 
+    /// The same picture with its linear values encoded by the sRGB curve, as ours are.
+    pub fn encoded(mut self) -> Self {
+        let curve = |x: f64| if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+        let encode = |value: &mut u8| *value = (255.0 * curve(f64::from(*value) / 255.0)).round() as u8;
+        self.rgb.as_flattened_mut().iter_mut().for_each(encode);
+        self
+    }
+
     /// Writes a PNG of 8 bits.
     pub fn write(&self, path: &Path) -> anyhow::Result<()> {
         self.encode(path).with_context(|| format!("{}: it cannot be written", path.display()))
@@ -52,7 +60,7 @@ impl Pixels {
 }
 
 /// What two pictures have in common.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Pixels all of whose channels differ by no more than [`SLACK`].
     pub agree: u64,
@@ -60,6 +68,8 @@ pub struct Comparison {
     pub pixels: u64,
     /// The greatest difference of a channel, and its column and row: the first of equals.
     pub worst: (u8, u32, u32),
+    /// The mean difference of a channel.
+    pub mean: f64,
     /// Differences, magnified, on black.
     pub difference: Pixels,
 }
@@ -72,18 +82,20 @@ impl Comparison {
     pub fn of(a: &Pixels, b: &Pixels) -> anyhow::Result<Self> {
         let size = |p: &Pixels| format!("{} x {}", p.width, p.height);
         anyhow::ensure!((a.width, a.height) == (b.width, b.height), "{} is not {}", size(a), size(b));
-        let (mut agree, mut worst) = (0, (0, 0, 0));
+        let (mut agree, mut worst, mut sum) = (0, (0, 0, 0), 0);
         let mut difference = a.clone();
         for (at, (pixel, other)) in (0..).zip(difference.rgb.iter_mut().zip(&b.rgb)) {
             let apart: [u8; 3] = std::array::from_fn(|c| pixel[c].abs_diff(other[c]));
             let most = apart[0].max(apart[1]).max(apart[2]);
+            sum += apart.iter().map(|&channel| u64::from(channel)).sum::<u64>();
             agree += u64::from(most <= SLACK);
             if most > worst.0 {
                 worst = (most, at % a.width, at / a.width);
             }
             *pixel = apart.map(|c| c.saturating_mul(MAGNIFIED));
         }
-        Ok(Self { agree, pixels: a.rgb.len() as u64, worst, difference })
+        let pixels = a.rgb.len() as u64;
+        Ok(Self { agree, pixels, worst, mean: sum as f64 / (3 * pixels) as f64, difference })
     }
 
     /// Share of the pixels that agree.
@@ -108,7 +120,12 @@ mod tests {
         assert_eq!((found.agree, found.pixels, found.worst), (2, 4, (255, 0, 1)));
         assert_eq!(found.difference, pixels(&[[32, 32, 16], [0, 48, 0], [255, 0, 0], [0, 0, 0]]));
         assert_eq!(found, Comparison { difference: found.difference.clone(), ..Comparison::of(&b, &a).unwrap() });
-        assert_eq!(found.share(), 0.5);
+        assert_eq!((found.share(), found.mean), (0.5, (2 + 2 + 1 + 3 + 255) as f64 / 12.0));
+    }
+
+    #[test]
+    fn linear_values_are_encoded() {
+        assert_eq!(pixels(&[[0, 1, 55], [128, 254, 255]]).encoded(), pixels(&[[0, 13, 128], [188, 255, 255]]));
     }
 
     #[test]
