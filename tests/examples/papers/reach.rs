@@ -120,9 +120,8 @@ fn goals_of(published: &Published) -> Result<Vec<Goal>> {
     };
     // With memory for all pages, nodes share the rays of the last tiles; without a budget a tile is the least that is given.
     let pov = |case: &str, scene: &str, published: String, least: f64, memory_mib: Option<u64>| {
-        let (with, option) = memory_mib.map_or_else(Default::default, |mib| {
-            (format!(", {mib} MiB a node"), format!(" --memory {mib}MiB"))
-        });
+        let (with, option) = memory_mib
+            .map_or_else(Default::default, |mib| (format!(", {mib} MiB a node"), format!(" --memory {mib}MiB")));
         Goal {
             case: format!("POV||Ray's farm, 38 workers, {case}{with}"),
             published,

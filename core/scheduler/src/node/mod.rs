@@ -9,6 +9,7 @@
 //! in hand stays there, and its page is fetched into a place that is kept for it.
 
 mod ahead;
+mod begin;
 mod choose;
 mod frames;
 mod memory;
@@ -30,15 +31,13 @@ pub(crate) use picture::Picture;
 use crate::policy::{Grid, LinkCost, Policy, subhost};
 use crate::{rules, send};
 use ahead::Ahead;
-use hybray_bintree::walk::{FROM_ROOT, Hit};
-use hybray_geometry::Ray;
+use begin::{InWork, Place, begin, next_bundle, primary, start_sample, trace_bundle};
+use hybray_bintree::walk::FROM_ROOT;
 use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Link, Peer};
-use hybray_pyraclip::wide;
 use hybray_scene::Pages;
-use hybray_shading::{id, sample_offset};
 use hybray_tracer::{Beyond, Lane, Scene, Walker, goes_together};
-use hybray_wire::{Counts, Message, RayKind, RayRecord, TILE, View};
+use hybray_wire::{Counts, Message, RayRecord, View};
 use memory::Bundle;
 use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
 use way::{Nothing, Way};
@@ -142,17 +141,6 @@ pub struct HighWater {
     pub page_bytes: u64,
 }
 
-/// Where a ray of the bundle belongs.
-#[derive(Clone, Copy, Default)]
-struct Place {
-    x: u32,
-    y: u32,
-    /// Tile of the bundle.
-    tile: u8,
-    /// Pixel of the tile.
-    pixel: u8,
-}
-
 #[derive(Clone, Copy)]
 struct Run {
     first: u32,
@@ -178,17 +166,6 @@ enum Stage {
     /// Primary rays of sample `sample` from `next` on are still to be shaded, up to `end`: those behind it were given
     /// away.
     Shading { sample: u16, next: usize, end: usize },
-}
-
-/// The bundle in work.
-#[derive(Clone, Copy)]
-struct InWork {
-    /// Tiles and their epochs.
-    tiles: [(u32, u16); TILES],
-    count: usize,
-    rays: usize,
-    /// Whether it was begun for the oldest run; else a tile is traced again.
-    of_run: bool,
 }
 
 /// Hits of the bundle whose shadow rays are traced together: records that the lane takes over one by one.
@@ -756,149 +733,4 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
 /// Whether a ray that needs `page` can go on here.
 fn at_hand<P: Pages + ?Sized>(scene: &Scene<'_, P>, page: u32) -> bool {
     page == FROM_ROOT || scene.resident.pages.nearest(page).is_some()
-}
-
-/// The primary rays of one sample.
-fn start_sample(picture: &Picture, sample: u16, places: &[Place], rays: &mut [Ray]) {
-    let frame = &picture.frame;
-    for (place, ray) in places.iter().zip(rays) {
-        let pixel_id = id::pixel_id(frame.seed, place.y * frame.width + place.x);
-        let offset = sample_offset(picture.filter, pixel_id, u32::from(sample), u32::from(frame.samples));
-        let seen = picture.camera.ray(place.x, place.y, offset);
-        *ray = Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY };
-    }
-}
-
-fn trace_bundle<P: Pages + ?Sized>(
-    scene: &Scene<'_, P>,
-    rays: &[Ray],
-    walked: &mut [hybray_bintree::walk::Walked],
-    walker: &mut Walker<'_>,
-) {
-    let (kernels, magnitude) = (walker.kernels, scene.magnitude);
-    let scratch = &mut walker.together.scratch;
-    wide::nearest(kernels, &scene.resident, magnitude, rays, walked, scratch, walker.stack, &mut walker.counts);
-}
-
-fn primary(
-    frame: &hybray_wire::Frame,
-    ray: &Ray,
-    place: &Place,
-    best: &Hit,
-    sample: u16,
-    (tile, epoch): (u32, u16),
-    home: Peer,
-) -> RayRecord {
-    RayRecord {
-        origin: ray.origin.to_array(),
-        direction: ray.direction.to_array(),
-        t_min: ray.t_min,
-        t_max: best.candidate.t,
-        id: id::primary_id(frame.seed, place.y * frame.width + place.x, u32::from(sample)),
-        primitive: best.candidate.id,
-        hit_page: best.page,
-        slot: best.slot.0,
-        weight: [1.0; 3],
-        pixel: place.pixel,
-        tile,
-        page: FROM_ROOT,
-        epoch,
-        home,
-        kind: RayKind::Primary as u8,
-        depth: 1,
-        ..bytemuck::Zeroable::zeroed()
-    }
-}
-
-/// Opens the tiles of the next bundle: one that is to be traced again, or the next of the oldest run. `None` if there is
-/// none, or no place for them.
-fn begin(
-    picture: &Picture,
-    runs: &heapless::Deque<Run, RUNS>,
-    tiles: &mut [OpenTile],
-    square_from: u32,
-) -> Option<InWork> {
-    let mut work = InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false };
-    if let Some(tile) = tiles.iter_mut().find(|t| t.stage == TileStage::Again) {
-        let (number, epoch) = (tile.tile, tile.epoch);
-        tile.open(&picture.frame, &picture.map, number, epoch);
-        work.tiles[0] = (number, epoch);
-        work.count = 1;
-        return Some(work);
-    }
-    let run = runs.front()?;
-    let first = run.first + run.done;
-    let count = bundle_of(picture, first, run.count - run.done, square_from) as usize;
-    if tiles.iter().filter(|t| t.stage == TileStage::Free).count() < count {
-        return None;
-    }
-    work.count = count;
-    work.of_run = true;
-    for (tile, work) in (first..).zip(&mut work.tiles[..count]) {
-        *work = (tile, run.epoch);
-        if let Some(place) = tiles.iter_mut().find(|t| t.stage == TileStage::Free) {
-            place.open(&picture.frame, &picture.map, tile, run.epoch);
-        }
-    }
-    Some(work)
-}
-
-/// First tile and number of tiles of the bundle that comes next, after one that is begun if there is one.
-fn next_bundle(
-    picture: &Picture,
-    runs: &heapless::Deque<Run, RUNS>,
-    begun: Option<&InWork>,
-    square_from: u32,
-) -> Option<(u32, u32)> {
-    let after = begun.filter(|work| work.of_run).map_or(0, |work| work.count as u32);
-    let mut runs = runs.iter();
-    let run = runs.next()?;
-    let (first, left) = match run.count - run.done - after {
-        0 => runs.next().map(|run| (run.first, run.count))?,
-        left => (run.first + run.done + after, left),
-    };
-    Some((first, bundle_of(picture, first, left, square_from)))
-}
-
-/// Tiles of the bundle that begins with tile `first`, of a run that has `left` tiles: a square if that is enough of them.
-fn bundle_of(picture: &Picture, first: u32, left: u32, square_from: u32) -> u32 {
-    if left >= square_from { picture.map.square(first, left) } else { 1 }
-}
-
-impl InWork {
-    /// Fills in where the bundle's rays belong; returns how many they are.
-    fn place(&self, picture: &Picture, places: &mut [Place; BUNDLE]) -> usize {
-        let first = picture.map.tile(self.tiles[0].0);
-        let mut rays = 0;
-        if self.count == TILES {
-            // A square along Morton's curve: halves of it, and of these, are compact.
-            let (right, below) = (picture.map.tile(self.tiles[1].0), picture.map.tile(self.tiles[2].0));
-            let (width, height) = (TILE + right.width, TILE + below.height);
-            for code in 0..BUNDLE as u32 {
-                let (x, y) = (even_bits(code), even_bits(code >> 1));
-                if x < width && y < height {
-                    let tile = (y / TILE) * 2 + x / TILE;
-                    let columns = if tile & 1 == 1 { right.width } else { TILE };
-                    let pixel = (y % TILE) * columns + x % TILE;
-                    places[rays] = Place { x: first.x + x, y: first.y + y, tile: tile as u8, pixel: pixel as u8 };
-                    rays += 1;
-                }
-            }
-        } else {
-            for code in 0..TILE_PIXELS as u32 {
-                let (x, y) = (even_bits(code), even_bits(code >> 1));
-                if x < first.width && y < first.height {
-                    let pixel = (y * first.width + x) as u8;
-                    places[rays] = Place { x: first.x + x, y: first.y + y, tile: 0, pixel };
-                    rays += 1;
-                }
-            }
-        }
-        rays
-    }
-}
-
-/// Every other bit, from the lowest.
-const fn even_bits(code: u32) -> u32 {
-    code & 1 | (code >> 1) & 2 | (code >> 2) & 4 | (code >> 3) & 8
 }
