@@ -139,6 +139,8 @@ fn cut_chunk<P: Primitives>(
             chunk.lines.extend_from_slice(lines);
         }
     })?;
+    // They stay: what they grew for and did not need goes back.
+    chunk.lines.shrink_to_fit();
     count_primitives(&mut chunk);
     Ok(chunk)
 }
