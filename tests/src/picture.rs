@@ -31,13 +31,11 @@ pub fn scene(name: &str) -> Model {
     model
 }
 
-/// The kernels that `HYBRAY_KERNELS` asks for, as the program has it: the best ones, or the portable ones.
+/// The kernels that `HYBRAY_KERNELS` asks for: `portable`, `avx2`, `avx512`, or else the best that the processor has.
 #[must_use]
 pub fn kernels() -> Kernels {
-    match std::env::var("HYBRAY_KERNELS").as_deref() {
-        Ok("portable") => Kernels::Portable,
-        _ => Kernels::detect(),
-    }
+    let asked = std::env::var("HYBRAY_KERNELS").unwrap_or_default();
+    Kernels::available().find(|kernels| kernels.name() == asked).unwrap_or_else(Kernels::detect)
 }
 
 /// Draws `prepared`, seen by its first camera, on `farm`. `what` is named when that fails.

@@ -131,7 +131,7 @@ fn check(name: &str, model: &Model, camera: bool) {
             corner_rays(&mut random, &leaves, origin)
         });
         for (i, rays) in bundles.iter().cloned().chain(corners).enumerate() {
-            for kernels in [Kernels::Portable, Kernels::detect()] {
+            for kernels in Kernels::available() {
                 let what = format!("{name} {settings:?} {kernels:?} bundle {i} of {} rays", rays.len());
                 check_bundle(&what, kernels, &scene, &leaves, packed.magnitude, &rays, &mut tally);
             }

@@ -177,7 +177,7 @@ fn check_closed(what: &str, model: Model) {
         });
         let Some(reach) = reach else { continue };
         inside += 1;
-        for kernels in [Kernels::Portable, Kernels::detect()] {
+        for kernels in Kernels::available() {
             let hit = nearest(kernels, &pages.resident(), ray, &mut stack, &mut counts).candidate;
             let distance = f64::from(hit.t) * f64::from(ray.direction.length()) / f64::from(unit);
             assert!(hit.is_hit() && distance < reach * 1.001, "{what}: a hole at {ray:?}: {distance} for {reach}");
@@ -255,7 +255,7 @@ fn a_closed_mesh_is_closed_from_within() {
         }
         for direction in directions {
             let ray = Ray { origin: eye, direction, t_min: 0.0, t_max: f32::INFINITY };
-            for kernels in [Kernels::Portable, Kernels::detect()] {
+            for kernels in Kernels::available() {
                 let hit = nearest(kernels, &pages.resident(), &ray, &mut stack, &mut counts);
                 assert!(hit.candidate.is_hit(), "at {by}: a hole at {ray:?}");
             }

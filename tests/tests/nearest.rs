@@ -41,7 +41,7 @@ fn check_rays(name: &str, model: &Model, rays: &[Ray]) {
         let mut coverage = vec![Coverage::NONE; source.len() as usize];
         check(&scene, &mut coverage, &mut vec![0; packed.pages()])
             .unwrap_or_else(|e| panic!("{name} {settings:?}: {e}"));
-        for kernels in [Kernels::Portable, Kernels::detect()] {
+        for kernels in Kernels::available() {
             let what = format!("{name} {settings:?} {kernels:?}");
             check_single(&what, kernels, &scene, rays, &expected);
             let bundle = *bundles.next().unwrap();

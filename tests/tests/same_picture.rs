@@ -51,7 +51,7 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
     let spreads = deck(random, &[Some(1.0), Some(2.0), Some(2.5), Some(8.0), None]);
     let atomics = deck(random, &[Some(1), Some(4), Some(64), None]);
     let dispatchers = deck(random, &[DispatcherAt::Host, DispatcherAt::Node]);
-    let kernels = deck(random, &[Kernels::Portable, Kernels::detect()]);
+    let kernels = deck(random, &Kernels::available().collect::<Vec<_>>());
     let trees = deck(random, &[0, 1, 2, 3]);
     let tiles = deck(random, &[Tiles::Dynamic, Tiles::Static, Tiles::PixelCount { pixels: 300 }]);
     let together = deck(random, &[true, true, false]);

@@ -105,7 +105,7 @@ fn check(
     // The midpoint rule puts a primitive into several pages, not all of which a ray that hits it meets.
     let stands_once = of_page.iter().map(Vec::len).sum::<usize>() == shapes.all.len();
     for (ray, expected) in rays {
-        for kernels in [Kernels::Portable, Kernels::detect()] {
+        for kernels in Kernels::available() {
             let what = format!("{name} {kernels:?} {} stores {ray:?}", stores.len());
             let whole = walk::<false>(
                 kernels,
@@ -291,7 +291,7 @@ fn walks_from_anywhere_end() {
         let beyond = views.len() as u32 + random.below(100) as u32;
         for from in [orphan, beyond, orphan + 1, u32::MAX - 1, u32::MAX / 2, random.bits() as u32 | 1 << 20] {
             let none = Hit::none(ray.t_max);
-            for kernels in [Kernels::Portable, Kernels::detect()] {
+            for kernels in Kernels::available() {
                 let ended = Walked { best: none, needs: None };
                 assert_eq!(walk::<false>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");
                 assert_eq!(walk::<true>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");

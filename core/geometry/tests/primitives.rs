@@ -188,7 +188,7 @@ fn lanes_agree_with_single_tests_to_the_bit() {
             continue;
         }
         let r = ray(o, d);
-        for kernels in [Kernels::Portable, Kernels::detect()] {
+        for kernels in Kernels::available() {
             let (t, hit) = kernels.run(Four(&r, &triangles));
             for i in 0..4 {
                 let single = triangles[i].hit(&r, 0, &FAR).map(|c| c.t.to_bits());

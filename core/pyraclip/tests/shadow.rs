@@ -81,7 +81,7 @@ fn check(
 ) {
     let (mut scratch, mut stack, mut counts) = (Scratch::new(), Stack::new(), Counts::default());
     let complete = scene.pages.here.iter().all(|&here| here);
-    for kernels in [Kernels::Portable, Kernels::detect()] {
+    for kernels in Kernels::available() {
         for any in [true, false] {
             // What stands there before must not matter.
             let mut walked = [Walked { best: Hit::none(-1.0), needs: Some(3) }; RAYS_MAX];

@@ -60,7 +60,8 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                 let store = Share { all: &views, here, parents: &hang };
                 let count = [1, 7, 8, 64, 200, RAYS_MAX][random.below(6)];
                 let rays = bundle(&mut random, count);
-                let kernels = [Kernels::Portable, Kernels::detect()][random.below(2)];
+                let available: Vec<_> = Kernels::available().collect();
+                let kernels = available[random.below(available.len())];
                 let scene = Resident { directory: resident.directory, pages: &store };
                 let elsewhere = Resident { directory: resident.directory, pages: &rest };
                 let what = format!("seed {seed} {rule:?} round {round} {kernels:?}");

@@ -132,7 +132,7 @@ fn trace<P: Pages + ?Sized>(
 fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
     let mut random = Random(seed);
     let primaries = primaries(400);
-    let kernels = [Kernels::Portable, Kernels::detect()];
+    let kernels: Vec<_> = Kernels::available().collect();
 
     let (mut expected, mut expected_counts, mut back) = (Film::default(), Counts::default(), Vec::new());
     for &ray in &primaries {
@@ -164,7 +164,7 @@ fn check(seed: u64, scene: &Scene<'_>, journeys: &mut Journeys) {
             page => stores.iter().filter(|store| store.here[page as usize]).collect(),
         };
         let store = with[random.below(with.len())];
-        let kernels = kernels[random.below(2)];
+        let kernels = kernels[random.below(kernels.len())];
         let mut back = Vec::new();
         trace(&scene.at_hand(store), kernels, ray, &mut film, &mut counts, &mut back, random.below(2) == 0);
         for ray in back {

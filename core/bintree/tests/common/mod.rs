@@ -230,7 +230,7 @@ pub fn verify(name: &str, built: &Built, primitives: usize, rays: &[(Ray, Candid
     let scene = built.resident(&views);
     let census = checked(&scene, primitives).unwrap_or_else(|fault| panic!("{name}: {fault}"));
     let (mut stack, mut counts) = (Stack::new(), Counts::default());
-    for kernels in [Kernels::Portable, Kernels::detect()] {
+    for kernels in Kernels::available() {
         for (ray, expected) in rays {
             let found = nearest(kernels, &scene, ray, &mut stack, &mut counts);
             assert_eq!(found.candidate, *expected, "{name} {kernels:?} {ray:?}");

@@ -12,7 +12,7 @@ use core::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 pub use portable::{OneLane, Portable};
 #[cfg(target_arch = "x86_64")]
-pub use x86::Avx2;
+pub use x86::{Avx2, Avx512};
 
 /// Some lanes of `f32`. `a` is `self`; comparisons with NaN are false.
 pub trait Lanes:
@@ -79,12 +79,16 @@ pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output
 pub trait Simd: Copy {
     /// Four lanes: a block of primitives.
     type F4: Lanes<Array = [f32; 4]>;
-    /// Eight lanes: a wide node's boxes, or eight rays.
+    /// Eight lanes: a wide node's boxes.
     type F8: Lanes<Array = [f32; 8]>;
+    /// Rays side by side: eight lanes or sixteen.
+    type Packet: Lanes;
     /// `x` in four lanes.
     fn splat4(self, x: f32) -> Self::F4;
     /// `x` in eight lanes.
     fn splat8(self, x: f32) -> Self::F8;
+    /// `x` in every lane of a packet.
+    fn splat_packet(self, x: f32) -> Self::Packet;
     /// Runs `kernel` compiled for this instruction set.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
     /// Four lanes from memory.
@@ -128,6 +132,9 @@ pub enum Kernels {
     /// AVX2: x86-64 since about 2013.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    /// AVX-512: packets of 16 rays.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
 
 impl Kernels {
@@ -135,20 +142,27 @@ impl Kernels {
     #[cfg(feature = "std")]
     #[must_use]
     pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::detect() {
-            return Self::Avx2(avx2);
-        }
-        Self::Portable
+        Self::available().last().unwrap_or_default()
     }
 
-    /// `portable`, `avx2`.
+    /// All that this processor has, the best last.
+    #[cfg(feature = "std")]
+    pub fn available() -> impl Iterator<Item = Self> {
+        let portable = core::iter::once(Self::Portable);
+        #[cfg(target_arch = "x86_64")]
+        let portable = portable.chain(Avx2::detect().map(Self::Avx2)).chain(Avx512::detect().map(Self::Avx512));
+        portable
+    }
+
+    /// `portable`, `avx2`, `avx512`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
         }
     }
 
@@ -159,6 +173,8 @@ impl Kernels {
             Self::Portable => Portable.run(kernel),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(avx2) => avx2.run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.run(kernel),
         }
     }
 }

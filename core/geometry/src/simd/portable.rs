@@ -21,12 +21,17 @@ pub struct Truths<const N: usize>([bool; N]);
 impl Simd for Portable {
     type F4 = Array<4>;
     type F8 = Array<8>;
+    type Packet = Array<8>;
     #[inline(always)]
     fn splat4(self, x: f32) -> Array<4> {
         Array([x; 4])
     }
     #[inline(always)]
     fn splat8(self, x: f32) -> Array<8> {
+        Array([x; 8])
+    }
+    #[inline(always)]
+    fn splat_packet(self, x: f32) -> Array<8> {
         Array([x; 8])
     }
     #[inline]

@@ -20,34 +20,56 @@ const AWKWARD: [f32; 16] = [
 ];
 
 /// All that the lanes can do to two numbers, as bits; NaNs are made alike, since their payload is no result.
-struct Everything([f32; 8], [f32; 8]);
+struct Everything([f32; 16], [f32; 16]);
 
 impl Kernel for Everything {
-    type Output = [[u32; 8]; 16];
-    #[inline(always)]
+    type Output = [[u32; 16]; 16];
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let (a, b) = (simd.load8(&self.0), simd.load8(&self.1));
-        let float = |x: S::F8| x.to_array().map(|x| if x.is_nan() { 1 } else { x.to_bits() });
-        let truth = |m: <S::F8 as Lanes>::Mask| core::array::from_fn(|i| m.bits() >> i & 1);
-        [
-            float(a + b),
-            float(a - b),
-            float(a * b),
-            float(a / b),
-            float(-a),
-            float(a.abs()),
-            float(a.abs().sqrt()),
-            float(a.or_greater(b)),
-            float(a.or_less(b)),
-            truth(a.lt(b)),
-            truth(a.le(b)),
-            truth(a.equal(b)),
-            truth(a.sign()),
-            truth(!(a.lt(b) | a.equal(b)) & a.le(b)),
-            float(a.select(a.lt(b), b)),
-            float(a.select(a.sign(), b)),
-        ]
+        let packets = lane_by_lane(&self, simd.splat_packet(0.0));
+        assert_eq!(packets, lane_by_lane(&self, simd.splat8(0.0)));
+        assert_eq!(packets, lane_by_lane(&self, simd.splat4(0.0)));
+        packets
     }
+}
+
+/// As many lanes at a time as there are.
+#[inline(always)]
+fn lane_by_lane<F: Lanes>(Everything(a, b): &Everything, like: F) -> [[u32; 16]; 16] {
+    let mut all = [[0; 16]; 16];
+    for first in (0..16).step_by(F::LANES) {
+        let load = |from: &[f32; 16]| {
+            let mut array = like.to_array();
+            array.as_mut().copy_from_slice(&from[first..first + F::LANES]);
+            like.load_like(&array)
+        };
+        let (a, b) = (load(a), load(b));
+        let floats = [
+            a + b,
+            a - b,
+            a * b,
+            a / b,
+            -a,
+            a.abs(),
+            a.abs().sqrt(),
+            a.or_greater(b),
+            a.or_less(b),
+            a.select(a.lt(b), b),
+            a.select(a.sign(), b),
+        ];
+        let masks = [a.lt(b), a.le(b), a.equal(b), a.sign(), !(a.lt(b) | a.equal(b)) & a.le(b)];
+        for (i, x) in floats.into_iter().enumerate() {
+            for (lane, x) in x.to_array().as_ref().iter().enumerate() {
+                all[i][first + lane] = if x.is_nan() { 1 } else { x.to_bits() };
+            }
+        }
+        for (i, mask) in masks.into_iter().enumerate() {
+            assert_eq!(mask.bits() >> F::LANES, 0);
+            for lane in 0..F::LANES {
+                all[floats.len() + i][first + lane] = mask.bits() >> lane & 1;
+            }
+        }
+    }
+    all
 }
 
 #[cfg(feature = "std")]
@@ -57,7 +79,10 @@ fn every_implementation_gives_the_portable_bits() {
         for j in 0..16 {
             let a = core::array::from_fn(|k| AWKWARD[(i + k) % 16]);
             let b = core::array::from_fn(|k| AWKWARD[(j + 3 * k) % 16]);
-            assert_eq!(Kernels::detect().run(Everything(a, b)), Kernels::Portable.run(Everything(a, b)), "{a:?} {b:?}");
+            let portable = Kernels::Portable.run(Everything(a, b));
+            for kernels in Kernels::available() {
+                assert_eq!(kernels.run(Everything(a, b)), portable, "{} {a:?} {b:?}", kernels.name());
+            }
         }
     }
 }

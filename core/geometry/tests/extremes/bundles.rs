@@ -67,7 +67,7 @@ fn check(name: &str, rays: &[Ray], magnitude: f32, random: &mut Random, totals: 
         let eight = boxes(ray, magnitude, random);
         let planes = |f: fn(&Aabb) -> Vec3| std::array::from_fn(|axis| eight.each_ref().map(|b| f(b)[axis]));
         let (lo, hi) = (planes(|b| b.lo), planes(|b| b.hi));
-        for kernels in [Kernels::Portable, Kernels::detect()] {
+        for kernels in Kernels::available() {
             let (mask, depth) = kernels.run(Meets(&bundle, lo, hi));
             for (i, aabb) in eight.iter().enumerate() {
                 let (near, far) = kernel.slab(aabb);
