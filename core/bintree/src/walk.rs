@@ -1,8 +1,8 @@
 //! The walk of one ray: nearest hit and any hit.
 
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
-use hybray_geometry::{Candidate, LaneRay, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Slot, WIDTH};
+use hybray_geometry::{Candidate, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
+use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Row, Slot, WIDTH};
 
 /// The directory, and the pages at hand: all of them unless `P` says otherwise.
 #[derive(Debug)]
@@ -66,14 +66,36 @@ pub const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
 /// walk. 4.5 KB.
 #[derive(Clone, Debug)]
 pub struct Stack {
-    waiting: [(f32, u32); STACK],
+    waiting: [Waiting; STACK],
+}
+
+/// A subtree that waits: the distance at which the ray enters it, above its packed child. Distances are not negative, so that
+/// the nearer is the smaller number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting(u64);
+
+impl Waiting {
+    #[inline(always)]
+    fn new(near: f32, child: u32) -> Self {
+        Self(u64::from(near.to_bits()) << 32 | u64::from(child))
+    }
+
+    #[inline(always)]
+    fn near(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    #[inline(always)]
+    fn child(self) -> u32 {
+        self.0 as u32
+    }
 }
 
 impl Stack {
     /// An empty stack.
     #[must_use]
     pub const fn new() -> Self {
-        Self { waiting: [(0.0, 0); STACK] }
+        Self { waiting: [Waiting(0); STACK] }
     }
 }
 
@@ -147,14 +169,8 @@ impl<const ANY: bool, P: Pages + ?Sized> Kernel for Walk<'_, '_, ANY, P> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Walked {
         let kernel = RayKernel::new(self.ray);
-        let mut walker = Walker::<S> {
-            simd,
-            boxes: BoxRay::new(simd, &kernel),
-            lanes: kernel.splat(simd.splat4(0.0)),
-            kernel,
-            best: self.best,
-            counts: Counts::default(),
-        };
+        let mut walker =
+            Walker::<S> { simd, boxes: BoxRay::new(simd, &kernel), kernel, best: self.best, counts: Counts::default() };
         let needs = walker.directory::<ANY, P>(self.scene, self.from, self.past, self.stack);
         *self.counts += walker.counts;
         Walked { best: walker.best, needs }
@@ -162,29 +178,37 @@ impl<const ANY: bool, P: Pages + ?Sized> Kernel for Walk<'_, '_, ANY, P> {
 }
 
 /// What a ray needs to meet eight boxes.
+#[derive(Clone, Copy)]
 struct BoxRay<S: Simd> {
     origin: [S::F8; 3],
     inverse: [S::F8; 3],
-    negative: [bool; 3],
+    /// Where the ray enters along each axis, and where it leaves.
+    near: [Row; 3],
+    far: [Row; 3],
     t_min: S::F8,
 }
 
 impl<S: Simd> BoxRay<S> {
     #[inline(always)]
     fn new(simd: S, ray: &RayKernel) -> Self {
+        let [x, y, z] = ray.inverse.map(f32::is_sign_negative);
+        let (near_x, far_x) = if x { (Row::HiX, Row::LoX) } else { (Row::LoX, Row::HiX) };
+        let (near_y, far_y) = if y { (Row::HiY, Row::LoY) } else { (Row::LoY, Row::HiY) };
+        let (near_z, far_z) = if z { (Row::HiZ, Row::LoZ) } else { (Row::LoZ, Row::HiZ) };
         Self {
             origin: simd.splat8_axes(ray.origin),
             inverse: simd.splat8_axes(ray.inverse),
-            negative: ray.inverse.map(f32::is_sign_negative),
+            near: [near_x, near_y, near_z],
+            far: [far_x, far_y, far_z],
             t_min: simd.splat8(ray.t_min),
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Walker<S: Simd> {
     simd: S,
     boxes: BoxRay<S>,
-    lanes: LaneRay<S::F4>,
     kernel: RayKernel,
     best: Hit,
     counts: Counts,
@@ -205,15 +229,18 @@ impl<S: Simd> Walker<S> {
             return None;
         }
         let (mut needs, mut last) = (None, f32::NEG_INFINITY);
-        waiting[0] = (self.kernel.t_min, Child::Inner(0).pack());
-        let mut top = if from == FROM_ROOT { 1 } else { self.descend(scene, from, waiting) };
+        waiting[0] = Waiting::new(self.kernel.t_min, Child::Inner(0).pack());
+        let mut top = 1;
+        if from != FROM_ROOT {
+            (self.counts.nodes, top) = self.descend(scene, from, waiting);
+        }
         while top > 0 {
             top -= 1;
-            let (near, packed) = waiting[top];
-            if near > self.best.candidate.t {
+            let next = waiting[top];
+            if next.near() > self.best.candidate.t {
                 continue;
             }
-            match Child::unpack(packed) {
+            match Child::unpack(next.child()) {
                 Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
                 Child::Page(page) => {
                     let view = if ANY { scene.pages.page(page) } else { scene.pages.nearest(page) };
@@ -222,7 +249,8 @@ impl<S: Simd> Walker<S> {
                             return Some(page);
                         }
                         needs = needs.or(Some(page));
-                        let exit = self.exit(scene, page);
+                        self.counts.nodes += 1;
+                        let exit = exit(scene, self.kernel, page);
                         last = if exit > last { exit } else { last };
                         continue;
                     };
@@ -241,27 +269,16 @@ impl<S: Simd> Walker<S> {
         needs
     }
 
-    /// Where the ray leaves the box of a page that is not at hand, rounded as in every slab: no hit in the page lies beyond.
-    /// Infinity where nobody says where the page hangs.
-    #[inline(never)]
-    fn exit<P: Pages + ?Sized>(&mut self, scene: &Resident<'_, P>, page: u32) -> f32 {
-        let nodes = scene.directory.nodes;
-        let parent = scene.pages.parents().get(nodes.len().saturating_add(page as usize));
-        let Some(&parent) = parent.filter(|&&parent| parent != NO_PARENT) else { return f32::INFINITY };
-        self.counts.nodes += 1;
-        self.kernel.slab(&nodes[parent as usize / WIDTH].aabb(parent as usize % WIDTH)).1
-    }
-
-    /// The stack as it was when the walk came to `page`, which is on top of it; returns its length. Along the way from the
+    /// The stack as it was when the walk came to `page`, which is on top of it; returns the count of nodes, and its length. Along the way from the
     /// root, what a node's walk would have met before the child that leads to the page is left out, and the rest waits.
-    /// Bounded: the directory's depth.
+    /// Bounded: the directory's depth. By value, so that the walk can stay in registers.
     #[inline(never)]
     fn descend<P: Pages + ?Sized>(
-        &mut self,
+        mut self,
         scene: &Resident<'_, P>,
         page: u32,
-        waiting: &mut [(f32, u32); STACK],
-    ) -> usize {
+        waiting: &mut [Waiting; STACK],
+    ) -> (u64, usize) {
         let (nodes, parents) = (scene.directory.nodes, scene.pages.parents());
         let mut path = [0; DEPTH_MAX];
         let mut levels = 0;
@@ -280,97 +297,134 @@ impl<S: Simd> Walker<S> {
             let child = node.child[parent as usize % WIDTH];
             let end = self.node(node, waiting, top);
             // If the child is not among those met, the best hit lies before it, and before all that come after it.
-            let Some(at) = (top..end).find(|&at| waiting[at].1 == child) else { return top };
+            let Some(at) = (top..end).find(|&at| waiting[at].child() == child) else { return (self.counts.nodes, top) };
             top = at;
         }
         // The child that the last step found is the page itself.
-        top + usize::from(levels > 0)
+        (self.counts.nodes, top + usize::from(levels > 0))
     }
 
     /// Through one page, on the part of the stack above `base`.
     #[inline(always)]
-    fn page<const ANY: bool>(
-        &mut self,
-        number: u32,
-        page: &PageView<'_>,
-        waiting: &mut [(f32, u32); STACK],
-        base: usize,
-    ) {
-        waiting[base] = (self.kernel.t_min, Child::Inner(0).pack());
-        let mut top = base + 1;
-        while top > base {
-            top -= 1;
-            let (near, packed) = waiting[top];
-            if near > self.best.candidate.t {
-                continue;
-            }
-            match Child::unpack(packed) {
-                Child::Inner(index) => top = self.node(&page.nodes[index as usize], waiting, top),
-                Child::Leaf { kind, start, count } => {
-                    self.leaf(number, page, kind, start as usize, count as usize);
-                    if ANY && self.best.candidate.is_hit() {
-                        return;
-                    }
+    fn page<const ANY: bool>(&mut self, number: u32, page: &PageView<'_>, waiting: &mut [Waiting; STACK], base: usize) {
+        let mut top = base;
+        let mut child = Child::Inner(0).pack();
+        loop {
+            let kind = Child::unpack(child);
+            if let Child::Inner(index) = kind {
+                if let Some(next) = self.step(&page.nodes[index as usize], waiting, &mut top) {
+                    child = next.child();
+                    continue;
                 }
-                Child::Page(_) | Child::Unused => {}
+            } else if let Child::Leaf { kind, start, count } = kind {
+                self.leaf(number, page, kind, start as usize, count as usize);
+                if ANY && self.best.candidate.is_hit() {
+                    return;
+                }
+            }
+            loop {
+                if top == base {
+                    return;
+                }
+                top -= 1;
+                let next = waiting[top];
+                if next.near() <= self.best.candidate.t {
+                    child = next.child();
+                    break;
+                }
             }
         }
     }
 
     /// Pushes the children of a node that the ray enters before its best hit, the nearest last; returns the new top.
     #[inline(always)]
-    fn node(&mut self, node: &Node, waiting: &mut [(f32, u32); STACK], top: usize) -> usize {
+    fn node(&mut self, node: &Node, waiting: &mut [Waiting; STACK], mut top: usize) -> usize {
+        if let Some(next) = self.step(node, waiting, &mut top) {
+            waiting[top] = next;
+            top += 1;
+        }
+        top
+    }
+
+    /// The nearest of a node's children that the ray enters before its best hit; the others are pushed, the nearest last.
+    #[inline(always)]
+    fn step(&mut self, node: &Node, waiting: &mut [Waiting; STACK], top: &mut usize) -> Option<Waiting> {
         self.counts.nodes += 1;
-        let b = &self.boxes;
-        let planes = |axis: usize| {
-            let (lo, hi) = (&node.lo[axis], &node.hi[axis]);
-            if b.negative[axis] { (hi, lo) } else { (lo, hi) }
-        };
-        let ((x0, x1), (y0, y1), (z0, z1)) = (planes(0), planes(1), planes(2));
-        let simd = self.simd;
+        let (b, simd, rows) = (&self.boxes, self.simd, node.rows());
+        let [x0, y0, z0] = b.near;
+        let [x1, y1, z1] = b.far;
         let (near, far) = slab(
             &b.origin,
             &b.inverse,
-            &[simd.load8(x0), simd.load8(y0), simd.load8(z0)],
-            &[simd.load8(x1), simd.load8(y1), simd.load8(z1)],
+            &[simd.load8(&rows[x0 as usize]), simd.load8(&rows[y0 as usize]), simd.load8(&rows[z0 as usize])],
+            &[simd.load8(&rows[x1 as usize]), simd.load8(&rows[y1 as usize]), simd.load8(&rows[z1 as usize])],
             b.t_min,
         );
         let best = simd.splat8(self.best.candidate.t);
         let mut met = (near.le(far) & near.le(best)).bits();
+        if met == 0 {
+            return None;
+        }
         let near = near.to_array();
-        let mut end = top;
-        while met != 0 {
+        let mut take = || {
             let slot = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
-            let entry = (near[slot], node.child[slot]);
-            // Insertion: most nodes are left with one to three children.
+            (Waiting::new(near[slot], node.child[slot]), met != 0)
+        };
+        // Most nodes are left with one to three children.
+        let (first, more) = take();
+        if !more {
+            return Some(first);
+        }
+        let (second, mut more) = take();
+        let (mut nearest, farther) = if second < first { (second, first) } else { (first, second) };
+        let base = *top;
+        let mut end = base;
+        waiting[end] = farther;
+        end += 1;
+        while more {
+            let mut next;
+            (next, more) = take();
+            if next < nearest {
+                core::mem::swap(&mut next, &mut nearest);
+            }
             let mut at = end;
-            while at > top && waiting[at - 1].0 < entry.0 {
+            while at > base && waiting[at - 1] < next {
                 waiting[at] = waiting[at - 1];
                 at -= 1;
             }
-            waiting[at] = entry;
+            waiting[at] = next;
             end += 1;
         }
-        end
+        *top = end;
+        Some(nearest)
     }
 
     #[inline(always)]
     fn leaf(&mut self, number: u32, page: &PageView<'_>, kind: Kind, start: usize, count: usize) {
         self.counts.blocks += count as u64;
+        // A broadcast costs no more than a load of what was broadcast before.
+        let lanes = self.kernel.splat(self.simd.splat4(0.0));
         match kind {
             Kind::Triangle => {
+                let [x, y, z] = lanes.axes;
                 for (i, block) in page.triangles[start..start + count].iter().enumerate() {
                     let simd = self.simd;
-                    let v = [simd.load4_axes(&block.v[0]), simd.load4_axes(&block.v[1]), simd.load4_axes(&block.v[2])];
-                    let (t, hit) = triangle_lanes(&self.lanes, &v);
+                    let corner = |i: usize| [&block.v[i][x], &block.v[i][y], &block.v[i][z]];
+                    let (a, b, c) = (corner(0), corner(1), corner(2));
+                    let v = [
+                        [simd.load4(a[0]), simd.load4(a[1]), simd.load4(a[2])],
+                        [simd.load4(b[0]), simd.load4(b[1]), simd.load4(b[2])],
+                        [simd.load4(c[0]), simd.load4(c[1]), simd.load4(c[2])],
+                    ];
+                    let (t, hit) = triangle_lanes(&lanes, &v);
                     self.keep(t, hit, &block.id, number, kind, start + i);
                 }
             }
             Kind::Sphere => {
                 for (i, block) in page.spheres[start..start + count].iter().enumerate() {
                     let centre = self.simd.load4_axes(&block.centre);
-                    let (t, hit) = sphere_lanes(&self.lanes, &centre, self.simd.load4(&block.radius));
+                    let (t, hit) = sphere_lanes(&lanes, &centre, self.simd.load4(&block.radius));
                     self.keep(t, hit, &block.id, number, kind, start + i);
                 }
             }
@@ -390,7 +444,7 @@ impl<S: Simd> Walker<S> {
         if hit == 0 {
             return;
         }
-        let inside = self.lanes.t_min.le(t) & t.le(self.simd.splat4(self.best.candidate.t));
+        let inside = self.simd.splat4(self.kernel.t_min).le(t) & t.le(self.simd.splat4(self.best.candidate.t));
         let mut hit = hit & inside.bits();
         let t = t.to_array();
         while hit != 0 {
@@ -402,4 +456,14 @@ impl<S: Simd> Walker<S> {
             }
         }
     }
+}
+
+/// Where the ray leaves the box of a page that is not at hand, rounded as in every slab: no hit in the page lies beyond.
+/// Infinity where nobody says where the page hangs.
+#[inline(never)]
+fn exit<P: Pages + ?Sized>(scene: &Resident<'_, P>, ray: RayKernel, page: u32) -> f32 {
+    let nodes = scene.directory.nodes;
+    let parent = scene.pages.parents().get(nodes.len().saturating_add(page as usize));
+    let Some(&parent) = parent.filter(|&&parent| parent != NO_PARENT) else { return f32::INFINITY };
+    ray.slab(&nodes[parent as usize / WIDTH].aabb(parent as usize % WIDTH)).1
 }

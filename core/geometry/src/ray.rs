@@ -71,6 +71,8 @@ impl RayKernel {
             direction: all(self.direction),
             inverse: all(self.inverse),
             axes: self.axes,
+            turned_origin: all(turn(self.origin, self.axes)),
+            turned_inverse: all(turn(self.inverse, self.axes)),
             shear: all(self.shear),
             t_min: like.splat_like(self.t_min),
         }
@@ -98,6 +100,10 @@ pub struct LaneRay<F> {
     pub inverse: [F; 3],
     /// See [`RayKernel`].
     pub axes: [usize; 3],
+    /// The origin in the order of `axes`.
+    pub turned_origin: [F; 3],
+    /// The inverse in the order of `axes`.
+    pub turned_inverse: [F; 3],
     /// See [`RayKernel`].
     pub shear: [F; 3],
     /// See [`RayKernel`].
@@ -112,11 +118,16 @@ pub fn ray_lanes<F: Lanes>(like: F, rays: &[RayKernel]) -> Option<LaneRay<F>> {
     if rays.len() != F::LANES || rays.iter().any(|r| r.axes != first.axes) {
         return None;
     }
+    let axes = first.axes;
+    let origin = three(like, rays, |r| &r.origin);
+    let inverse = three(like, rays, |r| &r.inverse);
     Some(LaneRay {
-        origin: three(like, rays, |r| &r.origin),
+        origin,
         direction: three(like, rays, |r| &r.direction),
-        inverse: three(like, rays, |r| &r.inverse),
-        axes: first.axes,
+        inverse,
+        axes,
+        turned_origin: turn(origin, axes),
+        turned_inverse: turn(inverse, axes),
         shear: three(like, rays, |r| &r.shear),
         t_min: gather(like, rays, |r| r.t_min),
     })
@@ -141,12 +152,24 @@ impl<F: Lanes> LaneRay<F> {
     #[must_use]
     #[inline(always)]
     pub fn own_slab(&self, lo: &[F; 3], hi: &[F; 3]) -> (F, F) {
-        let near = self.inverse[0].splat_like(f32::NEG_INFINITY);
-        let planes = |i: usize| {
-            let negative = self.inverse[i].sign();
-            (hi[i].select(negative, lo[i]), lo[i].select(negative, hi[i]))
-        };
-        let ((x0, x1), (y0, y1), (z0, z1)) = (planes(0), planes(1), planes(2));
-        crate::slab(&self.origin, &self.inverse, &[x0, y0, z0], &[x1, y1, z1], near)
+        own_slab(&self.origin, &self.inverse, lo, hi)
     }
+}
+
+/// `a` in another order of the axes.
+#[must_use]
+#[inline(always)]
+pub fn turn<T: Copy>(a: [T; 3], axes: [usize; 3]) -> [T; 3] {
+    [a[axes[0]], a[axes[1]], a[axes[2]]]
+}
+
+/// [`LaneRay::own_slab`], in any order of the axes.
+#[inline(always)]
+pub(crate) fn own_slab<F: Lanes>(origin: &[F; 3], inverse: &[F; 3], lo: &[F; 3], hi: &[F; 3]) -> (F, F) {
+    let planes = |i: usize| {
+        let negative = inverse[i].sign();
+        (hi[i].select(negative, lo[i]), lo[i].select(negative, hi[i]))
+    };
+    let ((x0, x1), (y0, y1), (z0, z1)) = (planes(0), planes(1), planes(2));
+    crate::slab(origin, inverse, &[x0, y0, z0], &[x1, y1, z1], inverse[0].splat_like(f32::NEG_INFINITY))
 }

@@ -1,5 +1,6 @@
 //! Triangles: Woop's watertight test (Woop, Benthin and Wald, JCGT 2013).
 
+use crate::ray::own_slab;
 use crate::simd::{Lanes, Mask, ONE_LANE};
 use crate::{Aabb, Candidate, LaneRay, RayKernel, SurfacePoint, Vec3, gamma};
 
@@ -10,7 +11,7 @@ pub struct Triangle {
     pub v: [Vec3; 3],
 }
 
-/// Triangles side by side: `[vertex][axis]`.
+/// Triangles side by side: `[vertex][axis]`, the axes in the order of the ray's sheared space ([`LaneRay::axes`]).
 pub type TriangleLanes<F> = [[F; 3]; 3];
 
 /// Edge functions of a triangle in the ray's sheared space, whose sum is the determinant.
@@ -28,15 +29,12 @@ struct Edges<F> {
 /// their difference is too, and a ray on a shared edge is inside one of its triangles or the other.
 #[inline(always)]
 fn edges<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -> Edges<F> {
-    let [x, y, z] = ray.axes;
+    let origin = &ray.turned_origin;
     let mut xy = [[ray.shear[0]; 2]; 3];
     let mut depth = [ray.shear[0]; 3];
     for i in 0..3 {
-        let away = triangle[i][z] - ray.origin[z];
-        xy[i] = [
-            triangle[i][x] - ray.origin[x] - ray.shear[0] * away,
-            triangle[i][y] - ray.origin[y] - ray.shear[1] * away,
-        ];
+        let away = triangle[i][2] - origin[2];
+        xy[i] = [triangle[i][0] - origin[0] - ray.shear[0] * away, triangle[i][1] - origin[1] - ray.shear[1] * away];
         depth[i] = ray.shear[2] * away;
     }
     let [a, b, c] = xy;
@@ -44,14 +42,14 @@ fn edges<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -> Edges<F> {
     let zero = ray.shear[0].splat_like(0.0);
     let on_edge = (edge[0].equal(zero) | edge[1].equal(zero) | edge[2].equal(zero)).bits();
     if on_edge != 0 {
-        exact_edges(&mut edge, &xy, on_edge);
+        edge = exact_edges(edge, xy, on_edge);
     }
     Edges { u: edge[0], v: edge[1], w: edge[2], z: depth, xy }
 }
 
 #[cold]
 #[inline(never)]
-fn exact_edges<F: Lanes>(edge: &mut [F; 3], xy: &[[F; 2]; 3], lanes: u32) {
+fn exact_edges<F: Lanes>(mut edge: [F; 3], xy: [[F; 2]; 3], lanes: u32) -> [F; 3] {
     let corner = xy.map(|p| p.map(F::to_array));
     let mut arrays = edge.map(F::to_array);
     for lane in (0..F::LANES).filter(|lane| lanes >> lane & 1 != 0) {
@@ -63,12 +61,14 @@ fn exact_edges<F: Lanes>(edge: &mut [F; 3], xy: &[[F; 2]; 3], lanes: u32) {
     for i in 0..3 {
         edge[i] = edge[i].load_like(&arrays[i]);
     }
+    edge
 }
 
 /// Tests each lane's ray against its triangle. Lanes in the mask are hit, at the distance returned, clamped to the own
 /// box; `t_min` and the best distance are the caller's to compare.
 #[inline(always)]
 pub fn triangle_lanes<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -> (F, u32) {
+    let origin = &ray.turned_origin;
     let e = edges(ray, triangle);
     let zero = e.u.splat_like(0.0);
     let below = e.u.lt(zero) | e.v.lt(zero) | e.w.lt(zero);
@@ -80,7 +80,7 @@ pub fn triangle_lanes<F: Lanes>(ray: &LaneRay<F>, triangle: &TriangleLanes<F>) -
     }
     let t = (e.u * e.z[0] + e.v * e.z[1] + e.w * e.z[2]) / det;
     let (lo, hi) = own_box(triangle);
-    let (near, far) = ray.own_slab(&lo, &hi);
+    let (near, far) = own_slab(origin, &ray.turned_inverse, &lo, &hi);
     let inside = accepted & near.le(far);
     (near.select(t.lt(near), far.select(far.lt(t), t)), inside.bits())
 }
@@ -117,19 +117,19 @@ impl Triangle {
     #[must_use]
     #[inline]
     pub fn aabb(&self) -> Aabb {
-        let (lo, hi) = own_box(&self.one_lane());
+        let (lo, hi) = own_box(&self.one_lane([0, 1, 2]));
         let corner = |c: [crate::simd::OneLane; 3]| Vec3::from_array(c.map(|x| x.to_array()[0]));
         Aabb { lo: corner(lo), hi: corner(hi) }
     }
 
-    fn one_lane(&self) -> TriangleLanes<crate::simd::OneLane> {
-        self.v.map(|p| p.to_array().map(|x| ONE_LANE.splat_like(x)))
+    fn one_lane(&self, axes: [usize; 3]) -> TriangleLanes<crate::simd::OneLane> {
+        self.v.map(|p| axes.map(|axis| ONE_LANE.splat_like(p[axis])))
     }
 
     /// The hit of `ray` before `best`, if there is one: [`triangle_lanes`] with one lane.
     #[must_use]
     pub fn hit(&self, ray: &RayKernel, id: u32, best: &Candidate) -> Option<Candidate> {
-        let (t, hit) = triangle_lanes(&ray.splat(ONE_LANE), &self.one_lane());
+        let (t, hit) = triangle_lanes(&ray.splat(ONE_LANE), &self.one_lane(ray.axes));
         let found = Candidate { t: t.to_array()[0], id };
         (hit != 0 && found.t >= ray.t_min && found.precedes(best)).then_some(found)
     }
@@ -140,7 +140,7 @@ impl Triangle {
     /// Humphreys, *Physically Based Rendering*, 4th edition, section 6.8.7.
     #[must_use]
     pub fn surface(&self, ray: &RayKernel, t: f32) -> SurfacePoint {
-        let e = edges(&ray.splat(ONE_LANE), &self.one_lane());
+        let e = edges(&ray.splat(ONE_LANE), &self.one_lane(ray.axes));
         let get = |x: crate::simd::OneLane| x.to_array()[0];
         let (u, v, w) = (get(e.u), get(e.v), get(e.w));
         let inverse_det = 1.0 / (u + v + w);

@@ -169,7 +169,7 @@ impl Kernel for Four<'_> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let like = simd.splat4(0.0);
         let lanes = core::array::from_fn(|vertex| {
-            core::array::from_fn(|axis| simd.load4(&core::array::from_fn(|i| self.1[i].v[vertex].to_array()[axis])))
+            self.0.axes.map(|axis| simd.load4(&core::array::from_fn(|i| self.1[i].v[vertex].to_array()[axis])))
         });
         let (t, hit) = triangle_lanes(&self.0.splat(like), &lanes);
         (t.to_array(), hit)

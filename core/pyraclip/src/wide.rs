@@ -8,7 +8,7 @@
 
 use hybray_bintree::walk::{Counts, Hit, Resident, STACK, Stack, Walk, Walked};
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
-use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes};
+use hybray_geometry::{Bundle, Candidate, LaneRay, Ray, RayKernel, ray_lanes, sphere_lanes, triangle_lanes, turn};
 use hybray_scene::{BLOCK, Child, Directory, Kind, Node, PageView, Pages, Slot, WIDTH};
 
 /// Rays of a bundle at most.
@@ -384,9 +384,9 @@ pub(crate) fn leaf<S: Simd>(
                     }
                     let corners = block.get(lane).v;
                     let v = [
-                        simd.splat8_axes(corners[0].to_array()),
-                        simd.splat8_axes(corners[1].to_array()),
-                        simd.splat8_axes(corners[2].to_array()),
+                        simd.splat8_axes(turn(corners[0].to_array(), lanes.axes)),
+                        simd.splat8_axes(turn(corners[1].to_array(), lanes.axes)),
+                        simd.splat8_axes(turn(corners[2].to_array(), lanes.axes)),
                     ];
                     let (t, hit) = triangle_lanes(lanes, &v);
                     keep(t, hit, block.id[lane], (start + i) * BLOCK + lane);

@@ -15,7 +15,7 @@ mod page;
 mod primitives;
 
 pub use directory::{Directory, DirectoryError, NO_PARENT, PageEntry, Pages, parents};
-pub use node::{Child, Node, WIDTH};
+pub use node::{Child, Node, Row, WIDTH};
 pub use page::{HEADER_BYTES, Header, Line, PAGE_BYTES_MAX, PageError, PageView, Tables, lines_for};
 pub use primitives::{BLOCK, ConeRecord, Kind, Slot, SphereBlock, TriangleBlock};
 

@@ -21,6 +21,24 @@ pub struct Node {
 
 const _: () = assert!(core::mem::size_of::<Node>() == 224);
 
+/// A side and an axis of a node's boxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Row {
+    /// Least x.
+    LoX,
+    /// Least y.
+    LoY,
+    /// Least z.
+    LoZ,
+    /// Greatest x.
+    HiX,
+    /// Greatest y.
+    HiY,
+    /// Greatest z.
+    HiZ,
+}
+
 /// Where a child slot leads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
@@ -98,6 +116,13 @@ impl Node {
             self.hi[axis][slot] = hi[axis];
         }
         self.child[slot] = child.pack();
+    }
+
+    /// All rows of eight: a side and an axis of the boxes each, by [`Row`]; the last one is the children.
+    #[must_use]
+    #[inline(always)]
+    pub fn rows(&self) -> &[[f32; WIDTH]; 7] {
+        bytemuck::cast_ref(self)
     }
 
     /// The box of `slot`.
