@@ -38,6 +38,9 @@ fn power(base: f32, exponent: f32) -> f32 {
     if !(exponent > 0.0) {
         return 1.0;
     }
+    if base == 0.0 {
+        return 0.0;
+    }
     let whole = exponent as u32;
     if exponent > MULTIPLIED_MAX || whole as f32 != exponent {
         return libm::powf(base, exponent);
@@ -74,6 +77,7 @@ mod tests {
         assert_eq!(power(0.5, f32::NAN), 1.0);
         assert_eq!(power(0.5, f32::INFINITY), 0.0);
         assert_eq!(power(0.0, 0.0), 1.0);
+        assert_eq!([0.3, 2.0, f32::INFINITY].map(|exponent| power(0.0, exponent).to_bits()), [0; 3]);
     }
 
     /// Angles in degrees from the normal, all in one plane: the view from `view`, the light at `light`.

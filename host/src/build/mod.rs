@@ -4,6 +4,7 @@
 //! above them all. Peak memory, beside the model: 32 bytes an item, and the pages themselves. Trees are built and cut a
 //! chunk at a time, in parallel, so that binary nodes and unfinished pages exist only for the chunks in work.
 
+mod area;
 mod objects;
 mod packed;
 mod source;

@@ -1,6 +1,7 @@
 //! What a build makes: pages, and the directory above them.
 
 use super::BuildError;
+use super::area::Area;
 use super::tree::VoxelTree;
 use crate::partition::{PlacedPage, Plan};
 use hybray_bintree::cut::FLAT;
@@ -28,10 +29,10 @@ pub(crate) struct Index {
 /// Pages and directory of a scene, in the internal unit (file units times `2^scale_log2`).
 pub struct Packed {
     index: Index,
-    /// Pages chunk by chunk, each at a line.
-    chunks: Vec<Vec<Line>>,
-    /// Chunk and first line of each page.
-    places: Vec<(u32, u32)>,
+    /// Pages, each at a line.
+    area: Area,
+    /// First line of each page.
+    places: Vec<u32>,
     /// File units times 2 to this power are internal units: exact.
     pub scale_log2: i32,
     /// Greatest absolute coordinate, internal units.
@@ -78,25 +79,32 @@ pub struct Pages<'a> {
 
 impl Packed {
     /// Puts pages, chunk by chunk, under their directory. The pages follow each other as the index has them.
+    ///
+    /// # Panics
+    /// If there are 256 GiB of them.
     pub(crate) fn new(index: Index, chunks: Vec<Vec<Line>>, scale_log2: i32, materials: usize) -> Self {
-        let (mut chunk, mut line) = (0, 0);
+        let area = Area::new(chunks);
+        let mut line = 0;
         let places = index.entries.iter().map(|entry| {
-            while chunks.get(chunk).is_some_and(|lines| lines.len() == line) {
-                (chunk, line) = (chunk + 1, 0);
-            }
-            let place = (chunk as u32, line as u32);
+            let place = u32::try_from(line).expect("pages have less than 256 GiB");
             line += lines_for(entry.bytes as usize);
             place
         });
         let places = places.collect();
         let magnitude = index.nodes.first().map_or(0.0, |n| n.bounds().magnitude());
-        Self { index, chunks, places, scale_log2, magnitude, materials }
+        Self { index, area, places, scale_log2, magnitude, materials }
     }
 
     /// Bytes of all pages.
     #[must_use]
     pub fn page_bytes(&self) -> u64 {
         self.index.entries.iter().map(|e| u64::from(e.bytes)).sum()
+    }
+
+    /// Bytes of pages in memory that the system mapped, and no allocator knows of.
+    #[must_use]
+    pub fn mapped_bytes(&self) -> u64 {
+        self.area.mapped_bytes()
     }
 
     /// Bytes of the directory.
@@ -120,9 +128,9 @@ impl Packed {
     /// The bytes of a page, padded to whole lines.
     #[must_use]
     pub fn page(&self, page: u32) -> &[Line] {
-        let (chunk, first) = self.places[page as usize];
+        let first = self.places[page as usize] as usize;
         let lines = lines_for(self.index.entries[page as usize].bytes as usize);
-        &self.chunks[chunk as usize][first as usize..][..lines]
+        &self.area.lines()[first..][..lines]
     }
 
     /// The bytes of each page.
