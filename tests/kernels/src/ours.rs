@@ -1,9 +1,9 @@
-//! Our kernels: the walk of one ray, and bundles of 256.
+//! Our kernels: the walk of one ray, and bundles.
 
 use hybray_bintree::walk::{self, Hit, Resident, Stack, Walked};
 use hybray_geometry::Ray;
 use hybray_geometry::simd::Kernels;
-use hybray_pyraclip::wide;
+use hybray_pyraclip::{shadow, wide};
 use hybray_scene::WIDTH;
 
 use crate::engine::{Answer, Counts, Engine, Kind};
@@ -68,7 +68,7 @@ impl Engine for Single<'_> {
     }
 }
 
-/// 256 rays at a time.
+/// 256 rays at a time; 64 of those to a light.
 pub struct Bundles<'a> {
     walker: Walker<'a>,
     magnitude: f32,
@@ -90,13 +90,15 @@ impl Engine for Bundles<'_> {
     }
 
     fn trace(&mut self, kind: Kind, rays: &[Ray], out: &mut [Answer]) -> bool {
-        if kind.is_any() {
-            return false;
-        }
         let Walker { scene, kernels, stack, counts } = &mut self.walker;
-        let (scratch, walked) = (&mut self.scratch, &mut self.walked);
-        for (rays, out) in rays.chunks(wide::RAYS_MAX).zip(out.chunks_mut(wide::RAYS_MAX)) {
-            wide::nearest(*kernels, scene, self.magnitude, rays, walked, scratch, stack, counts);
+        let (scratch, walked, magnitude) = (&mut self.scratch, &mut self.walked, self.magnitude);
+        let most = if kind.is_any() { shadow::RAYS_MAX } else { wide::RAYS_MAX };
+        for (rays, out) in rays.chunks(most).zip(out.chunks_mut(most)) {
+            if kind.is_any() {
+                shadow::trace::<true, _>(*kernels, scene, magnitude, rays, walked, scratch, stack, counts);
+            } else {
+                wide::nearest(*kernels, scene, magnitude, rays, walked, scratch, stack, counts);
+            }
             for (out, walked) in out.iter_mut().zip(&*walked) {
                 *out = answer(&walked.best);
             }
