@@ -45,7 +45,7 @@ fn check_rays(name: &str, model: &Model, rays: &[Ray]) {
             let what = format!("{name} {settings:?} {kernels:?}");
             check_single(&what, kernels, &scene, rays, &expected);
             let bundle = *bundles.next().unwrap();
-            check_bundles(&format!("{what} {bundle}"), kernels, &scene, packed.magnitude, rays, &expected, bundle);
+            check_bundles(&format!("{what} {bundle}"), kernels, &scene, rays, &expected, bundle);
         }
     }
 }
@@ -64,7 +64,6 @@ fn check_bundles(
     what: &str,
     kernels: Kernels,
     scene: &Resident<'_>,
-    magnitude: f32,
     rays: &[Ray],
     expected: &[Candidate],
     bundle: usize,
@@ -72,7 +71,7 @@ fn check_bundles(
     let (mut scratch, mut stack, mut counts) = (wide::Scratch::new(), Stack::new(), Counts::default());
     let mut walked = [Walked { best: Hit::none(0.0), needs: Some(0) }; wide::RAYS_MAX];
     for (rays, expected) in rays.chunks(bundle).zip(expected.chunks(bundle)) {
-        wide::nearest(kernels, scene, magnitude, rays, &mut walked, &mut scratch, &mut stack, &mut counts);
+        wide::nearest(kernels, scene, rays, &mut walked, &mut scratch, &mut stack, &mut counts);
         for ((walked, expected), ray) in walked.iter().zip(expected).zip(rays) {
             assert_eq!((walked.best.candidate, walked.needs), (*expected, None), "{what} {ray:?}");
         }

@@ -18,8 +18,6 @@ pub struct Bundle {
     last_origin: f32,
     /// Units of `t` of the fastest ray for one unit along the axis, rounded down.
     t_per_depth: f32,
-    /// Boxes that no ray meets before this `t` are left out.
-    t_last: f32,
 }
 
 /// Rays further from the axis than this (cosine) are not a bundle: its planes would be almost flat.
@@ -86,14 +84,7 @@ impl Bundle {
             margins,
             last_origin: last_origin + margins[4],
             t_per_depth: (1.0 - 8.0 * UNIT_ROUNDOFF) / fastest,
-            t_last: f32::INFINITY,
         })
-    }
-
-    /// The same for rays of which none goes further than `t`.
-    #[must_use]
-    pub fn until(self, t: f32) -> Self {
-        Self { t_last: t, ..self }
     }
 
     /// Which of eight boxes any ray of the bundle may meet, and the least `t` at which one could.
@@ -110,7 +101,7 @@ impl Bundle {
         outside |= last.lt(simd.splat8(self.offsets[4] - self.margins[4])).bits();
         let depth = self.value(simd, 4, lo, hi) - simd.splat8(self.last_origin);
         let near = (depth * simd.splat8(self.t_per_depth)).or_greater(simd.splat8(0.0));
-        (!outside & near.le(simd.splat8(self.t_last)).bits(), near.to_array())
+        (!outside & 0xff, near.to_array())
     }
 
     /// `normal . corner` for eight boxes: the corner with `upper` coordinates where the normal points up.

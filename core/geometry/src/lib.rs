@@ -32,7 +32,7 @@ pub use cone::Cone;
 pub use glam::Vec3;
 pub use hit::{Candidate, SurfacePoint};
 pub use pyramid::Pyramid;
-pub use ray::{LaneRay, Ray, RayKernel, ray_lanes, turn};
+pub use ray::{LaneRay, Ray, RayKernel, turn};
 pub use sphere::{Sphere, sphere_lanes};
 pub use triangle::{Triangle, TriangleLanes, triangle_lanes};
 

@@ -1,6 +1,6 @@
 //! Rays, and what is computed once for each before its tests.
 
-use crate::simd::Lanes;
+use crate::simd::{Lanes, Mask};
 use crate::{Aabb, Vec3};
 
 /// `origin + t direction` for `t` in `t_min..=t_max`. The direction is not zero, and need not have length 1.
@@ -110,44 +110,55 @@ pub struct LaneRay<F> {
     pub t_min: F,
 }
 
-/// Rays side by side, one a lane. `None` if their `axes` differ: such rays share no shear, and are traced singly.
-#[must_use]
-#[inline(always)]
-pub fn ray_lanes<F: Lanes>(like: F, rays: &[RayKernel]) -> Option<LaneRay<F>> {
-    let first = rays.first()?;
-    if rays.len() != F::LANES || rays.iter().any(|r| r.axes != first.axes) {
-        return None;
-    }
-    let axes = first.axes;
-    let origin = three(like, rays, |r| &r.origin);
-    let inverse = three(like, rays, |r| &r.inverse);
-    Some(LaneRay {
-        origin,
-        direction: three(like, rays, |r| &r.direction),
-        inverse,
-        axes,
-        turned_origin: turn(origin, axes),
-        turned_inverse: turn(inverse, axes),
-        shear: three(like, rays, |r| &r.shear),
-        t_min: gather(like, rays, |r| r.t_min),
-    })
-}
-
-#[inline(always)]
-fn gather<F: Lanes>(like: F, rays: &[RayKernel], get: impl Fn(&RayKernel) -> f32) -> F {
-    let mut array = like.to_array();
-    for (lane, ray) in array.as_mut().iter_mut().zip(rays) {
-        *lane = get(ray);
-    }
-    like.load_like(&array)
-}
-
-#[inline(always)]
-fn three<F: Lanes>(like: F, rays: &[RayKernel], get: impl Fn(&RayKernel) -> &[f32; 3]) -> [F; 3] {
-    [gather(like, rays, |r| get(r)[0]), gather(like, rays, |r| get(r)[1]), gather(like, rays, |r| get(r)[2])]
-}
-
 impl<F: Lanes> LaneRay<F> {
+    /// Rays side by side, one a lane, the last in what lanes are left: in each lane what [`RayKernel::new`] makes of its ray.
+    /// `None` if there are no rays, or their `axes` differ: such rays share no shear, and are traced singly.
+    ///
+    /// # Panics
+    /// If there are more rays than lanes.
+    #[must_use]
+    #[inline(always)]
+    pub fn side_by_side(like: F, rays: &[Ray]) -> Option<Self> {
+        let mut row = [[like.to_array(); 3]; 2];
+        let mut start = like.to_array();
+        let last = rays.len().checked_sub(1)?;
+        assert!(last < F::LANES);
+        for lane in 0..F::LANES {
+            let ray = &rays[if lane < last { lane } else { last }];
+            let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+            for axis in 0..3 {
+                row[0][axis].as_mut()[lane] = origin[axis];
+                row[1][axis].as_mut()[lane] = direction[axis];
+            }
+            start.as_mut()[lane] = ray.t_min;
+        }
+        let [o, d] = &row;
+        let origin = [like.load_like(&o[0]), like.load_like(&o[1]), like.load_like(&o[2])];
+        let d = [like.load_like(&d[0]), like.load_like(&d[1]), like.load_like(&d[2])];
+        let axes = RayKernel::new(&rays[0]).axes;
+        let [x, y, z] = axes;
+        // The longest component, as in `RayKernel::new`, and its sign: the same in all lanes, or not.
+        let (ax, ay, az) = (d[0].abs(), d[1].abs(), d[2].abs());
+        let longest = [az.lt(ax) & ay.lt(ax), az.lt(ay) & !ay.lt(ax)];
+        let is = match z {
+            0 => longest[0],
+            1 => longest[1],
+            _ => !(longest[0] | longest[1]),
+        };
+        let zero = like.splat_like(0.0);
+        let downward = d[z].lt(zero);
+        let same = is & if y == (z + 1) % 3 { downward } else { !downward };
+        if same.bits() != (!0 >> (32 - F::LANES)) {
+            return None;
+        }
+        let one = like.splat_like(1.0);
+        let inverse = [one / d[0], one / d[1], one / d[2]];
+        let shear = [d[x] / d[z], d[y] / d[z], inverse[z]];
+        let (turned_origin, turned_inverse) = (turn(origin, axes), turn(inverse, axes));
+        let t_min = like.load_like(&start);
+        Some(Self { origin, direction: d, inverse, axes, turned_origin, turned_inverse, shear, t_min })
+    }
+
     /// The slab interval of a primitive's own box, from minus infinity on.
     #[must_use]
     #[inline(always)]

@@ -71,14 +71,7 @@ struct Totals {
 }
 
 /// What is found among the pages that are `here`, with each way of asking.
-fn check(
-    what: &str,
-    shapes: &Shapes,
-    scene: &Resident<'_, Share<'_>>,
-    rays: &[Ray],
-    magnitude: f32,
-    totals: &mut Totals,
-) {
+fn check(what: &str, shapes: &Shapes, scene: &Resident<'_, Share<'_>>, rays: &[Ray], totals: &mut Totals) {
     let (mut scratch, mut stack, mut counts) = (Scratch::new(), Stack::new(), Counts::default());
     let complete = scene.pages.here.iter().all(|&here| here);
     for kernels in Kernels::available() {
@@ -87,9 +80,9 @@ fn check(
             let mut walked = [Walked { best: Hit::none(-1.0), needs: Some(3) }; RAYS_MAX];
             let (w, s, t, c) = (&mut walked, &mut scratch, &mut stack, &mut counts);
             if any {
-                shadow::trace::<true, _>(kernels, scene, magnitude, rays, w, s, t, c);
+                shadow::trace::<true, _>(kernels, scene, rays, w, s, t, c);
             } else {
-                shadow::trace::<false, _>(kernels, scene, magnitude, rays, w, s, t, c);
+                shadow::trace::<false, _>(kernels, scene, rays, w, s, t, c);
             }
             for (ray, walked) in rays.iter().zip(walked) {
                 let expected = shapes.brute_force(ray);
@@ -120,9 +113,8 @@ fn check_shapes(name: &str, shapes: &Shapes, seed: u64, rounds: usize, totals: &
         let views = built.views();
         let resident = built.resident(&views);
         let bounds = built.nodes.first().map(|node| node.bounds());
-        let (middle, size, magnitude) = bounds.map_or((Vec3::ZERO, 1.0, 0.0), |b| {
-            ((b.lo + b.hi) * 0.5, (b.hi - b.lo).max_element() * 0.5, b.magnitude())
-        });
+        let (middle, size) =
+            bounds.map_or((Vec3::ZERO, 1.0), |b| ((b.lo + b.hi) * 0.5, (b.hi - b.lo).max_element() * 0.5));
         let mut hang = vec![0; built.nodes.len() + views.len()];
         parents(&built.nodes, &mut hang);
         for round in 0..rounds {
@@ -133,7 +125,7 @@ fn check_shapes(name: &str, shapes: &Shapes, seed: u64, rounds: usize, totals: &
             let scene = Resident { directory: resident.directory, pages: &share };
             let before = totals.unknown;
             let what = format!("{name} {rule:?} round {round}");
-            check(&what, shapes, &scene, &rays(&mut random, middle, size), magnitude, totals);
+            check(&what, shapes, &scene, &rays(&mut random, middle, size), totals);
             assert!(!complete || totals.unknown == before, "{what}: everything is here");
         }
     }
@@ -171,7 +163,6 @@ fn nodes(side: f32, from_hits: bool) -> (u64, u64) {
     let built = build(&shapes, Rule::Sah(sah::Settings::default()), 4096).unwrap();
     let views = built.views();
     let scene = built.resident(&views);
-    let magnitude = built.nodes[0].bounds().magnitude();
     let rays: Vec<Ray> = (0..64)
         .map(|i| {
             let wide = Vec3::new((i % 8) as f32 / 7.0 - 0.5, 0.0, (i / 8) as f32 / 7.0 - 0.5) * side;
@@ -187,7 +178,7 @@ fn nodes(side: f32, from_hits: bool) -> (u64, u64) {
     }
     let mut walked = [Walked { best: Hit::none(0.0), needs: None }; RAYS_MAX];
     let (scratch, stack) = (&mut scratch, &mut stack);
-    shadow::trace::<true, _>(Kernels::Portable, &scene, magnitude, &rays, &mut walked, scratch, stack, &mut together);
+    shadow::trace::<true, _>(Kernels::Portable, &scene, &rays, &mut walked, scratch, stack, &mut together);
     (single.nodes, together.nodes)
 }
 

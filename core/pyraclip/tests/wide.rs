@@ -8,7 +8,7 @@ use common::{Random, Rule, Shapes, build};
 use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk, Walked, nearest};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
-use hybray_geometry::{Bundle, Ray, Vec3};
+use hybray_geometry::{Ray, Vec3};
 use hybray_pyraclip::wide::{self, RAYS_MAX, Scratch};
 use hybray_scene::{Child, PageView, Pages, parents};
 
@@ -50,7 +50,6 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
             let built = build(&shapes, rule, [1024, 4096][seed as usize % 2]).unwrap();
             let views = built.views();
             let resident = built.resident(&views);
-            let magnitude = built.nodes[0].bounds().magnitude();
             let mut hang = vec![0; built.nodes.len() + views.len()];
             parents(&built.nodes, &mut hang);
             for round in 0..12 {
@@ -68,7 +67,7 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                 // What stands there before must not matter.
                 let stale = Walked { best: Hit::none(-1.0), needs: Some(3) };
                 let mut walked = vec![stale; rays.len()];
-                wide::nearest(kernels, &scene, magnitude, &rays, &mut walked, &mut scratch, &mut stack, &mut counts);
+                wide::nearest(kernels, &scene, &rays, &mut walked, &mut scratch, &mut stack, &mut counts);
                 for (ray, mut walked) in rays.iter().zip(walked) {
                     if walked.needs.is_some() {
                         needed += 1
@@ -101,14 +100,25 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
                     assert_eq!(walked.best.candidate, shapes.brute_force(ray), "{what} {ray:?}");
                     hits += usize::from(expected.candidate.is_hit());
                 }
-                if let Some(bundle) = Bundle::around(rays.iter(), magnitude) {
-                    // A list has every leaf that is met, or the page that it is in.
-                    let all = scratch.clip(kernels, &resident, &bundle, &mut counts).map(<[_]>::to_vec);
-                    let some = scratch.clip(kernels, &scene, &bundle, &mut counts).map(<[_]>::to_vec);
-                    if let (Some(all), Some(some)) = (all, some) {
-                        let is_page = |leaf: &wide::Leaf| matches!(Child::unpack(leaf.child), Child::Page(_));
-                        let missing: Vec<u32> =
-                            some.iter().filter(|leaf| is_page(leaf)).map(|leaf| leaf.page).collect();
+                {
+                    // A list has every leaf that is met, or the page that it is in, unless it is full.
+                    let all: Vec<_> =
+                        scratch.clip(kernels, &resident, &rays, &mut counts).into_iter().flatten().collect();
+                    let some: Vec<_> =
+                        scratch.clip(kernels, &scene, &rays, &mut counts).into_iter().flatten().collect();
+                    let is_page = |entry: &wide::Entry| matches!(Child::unpack(entry.child), Child::Page(_));
+                    let page = |entry: &wide::Entry| match Child::unpack(entry.child) {
+                        Child::Page(page) => page,
+                        _ => entry.page,
+                    };
+                    let is_whole = |list: &[wide::Entry]| {
+                        list.iter().all(|entry| match Child::unpack(entry.child) {
+                            Child::Page(page) => !store.here[page as usize],
+                            child => matches!(child, Child::Leaf { .. }),
+                        })
+                    };
+                    if is_whole(&all) && is_whole(&some) {
+                        let missing: Vec<u32> = some.iter().filter(|leaf| is_page(leaf)).map(page).collect();
                         assert!(missing.iter().all(|&page| !store.here[page as usize]), "{what}");
                         let (gone, kept): (Vec<_>, Vec<_>) = all.iter().partition(|leaf| missing.contains(&leaf.page));
                         let listed: Vec<_> = some.iter().filter(|leaf| !is_page(leaf)).collect();

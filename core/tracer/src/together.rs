@@ -131,13 +131,13 @@ fn trace<S: Sink, P: Pages + ?Sized>(
         }
     }
     let rays = &rays[..count];
-    let (kernels, magnitude, resident) = (walker.kernels, scene.magnitude, &scene.resident);
+    let (kernels, resident) = (walker.kernels, &scene.resident);
     let (stack, walks) = (&mut *walker.stack, &mut walker.counts);
     // Behind glass it matters what is met first.
     if scene.transmits {
-        shadow::trace::<false, P>(kernels, resident, magnitude, rays, walked, scratch, stack, walks);
+        shadow::trace::<false, P>(kernels, resident, rays, walked, scratch, stack, walks);
     } else {
-        shadow::trace::<true, P>(kernels, resident, magnitude, rays, walked, scratch, stack, walks);
+        shadow::trace::<true, P>(kernels, resident, rays, walked, scratch, stack, walks);
     }
     walker.ahead += count as u64;
     for (sent, walked) in sent[..count].iter().zip(walked) {

@@ -133,10 +133,8 @@ fn report(args: &Args) -> anyhow::Result<Report> {
     let scene = prepared.scene(&pages);
     let sets = rays::sets(&prepared, &scene, primary);
 
-    let mut engines: Vec<Box<dyn Engine + '_>> = vec![
-        Box::new(Single::new(pages.resident())),
-        Box::new(Bundles::new(pages.resident(), prepared.packed.magnitude)),
-    ];
+    let mut engines: Vec<Box<dyn Engine + '_>> =
+        vec![Box::new(Single::new(pages.resident())), Box::new(Bundles::new(pages.resident()))];
     let given = clustered::Given::new(&source);
     for form in [Form::Compressed, Form::Binary].into_iter().filter(|_| !args.alone) {
         let (engine, built) = clustered_best(&given, form, &sets, args.builds);

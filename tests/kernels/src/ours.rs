@@ -71,16 +71,15 @@ impl Engine for Single<'_> {
 /// 256 rays at a time; 64 of those to a light.
 pub struct Bundles<'a> {
     walker: Walker<'a>,
-    magnitude: f32,
     scratch: wide::Scratch,
     walked: Vec<Walked>,
 }
 
 impl<'a> Bundles<'a> {
-    /// Over pages that are all at hand, with no coordinate beyond `magnitude`.
-    pub fn new(scene: Resident<'a>, magnitude: f32) -> Self {
+    /// Over pages that are all at hand.
+    pub fn new(scene: Resident<'a>) -> Self {
         let walked = vec![Walked { best: Hit::none(0.0), needs: None }; wide::RAYS_MAX];
-        Self { walker: Walker::new(scene), magnitude, scratch: wide::Scratch::new(), walked }
+        Self { walker: Walker::new(scene), scratch: wide::Scratch::new(), walked }
     }
 }
 
@@ -91,13 +90,13 @@ impl Engine for Bundles<'_> {
 
     fn trace(&mut self, kind: Kind, rays: &[Ray], out: &mut [Answer]) -> bool {
         let Walker { scene, kernels, stack, counts } = &mut self.walker;
-        let (scratch, walked, magnitude) = (&mut self.scratch, &mut self.walked, self.magnitude);
+        let (scratch, walked) = (&mut self.scratch, &mut self.walked);
         let most = if kind.is_any() { shadow::RAYS_MAX } else { wide::RAYS_MAX };
         for (rays, out) in rays.chunks(most).zip(out.chunks_mut(most)) {
             if kind.is_any() {
-                shadow::trace::<true, _>(*kernels, scene, magnitude, rays, walked, scratch, stack, counts);
+                shadow::trace::<true, _>(*kernels, scene, rays, walked, scratch, stack, counts);
             } else {
-                wide::nearest(*kernels, scene, magnitude, rays, walked, scratch, stack, counts);
+                wide::nearest(*kernels, scene, rays, walked, scratch, stack, counts);
             }
             for (out, walked) in out.iter_mut().zip(&*walked) {
                 *out = answer(&walked.best);

@@ -52,9 +52,9 @@ pub(super) fn trace_bundle<P: Pages + ?Sized>(
     walked: &mut [Walked],
     walker: &mut Walker<'_>,
 ) {
-    let (kernels, magnitude) = (walker.kernels, scene.magnitude);
+    let kernels = walker.kernels;
     let scratch = &mut walker.together.scratch;
-    wide::nearest(kernels, &scene.resident, magnitude, rays, walked, scratch, walker.stack, &mut walker.counts);
+    wide::nearest(kernels, &scene.resident, rays, walked, scratch, walker.stack, &mut walker.counts);
 }
 
 pub(super) fn primary(

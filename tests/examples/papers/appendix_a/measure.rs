@@ -11,7 +11,7 @@ use hybray_bintree::midpoint::{self, Tree};
 use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walked, nearest};
 use hybray_bintree::{BinaryNode, Item};
 use hybray_geometry::simd::Kernels;
-use hybray_geometry::{Aabb, Bundle, Candidate, Cone, Pyramid, Ray, RayKernel, Sphere, Triangle};
+use hybray_geometry::{Aabb, Candidate, Cone, Pyramid, Ray, RayKernel, Sphere, Triangle};
 use hybray_pyraclip::{ClipCell, ClipCounts, ClipPyramid, TraverseCounts, clip, traverse, wide};
 use hybray_scene::Kind;
 use hybray_tests::{camera_rays, kernels, scene};
@@ -118,7 +118,7 @@ pub fn measure(job: &Job) -> Result<Measured, String> {
     let pages = packed.open().map_err(|e| e.to_string())?;
     let resident = pages.resident();
 
-    let mut fast = Fast { kernels: kernels(), scene: &resident, magnitude: packed.magnitude, ..Fast::new(&resident) };
+    let mut fast = Fast { kernels: kernels(), scene: &resident, ..Fast::new(&resident) };
     let mut listing = Listing::default();
     let mut walk = |way: Way, hits: &mut [Candidate]| match way {
         Way::Single => single(&tree, &rays, &mut objects, &mut listing, hits),
@@ -348,7 +348,6 @@ fn in_grid(grid: &Grid, rays: &[Ray], objects: &mut Objects, hits: &mut [Candida
 struct Fast<'s> {
     kernels: Kernels,
     scene: &'s Resident<'s>,
-    magnitude: f32,
     stack: Stack,
     scratch: wide::Scratch,
     walked: Vec<Walked>,
@@ -358,7 +357,7 @@ impl<'s> Fast<'s> {
     fn new(scene: &'s Resident<'s>) -> Self {
         let walked = vec![Walked { best: Hit::none(0.0), needs: None }; wide::RAYS_MAX];
         let (stack, scratch) = (Stack::new(), wide::Scratch::new());
-        Self { kernels: Kernels::Portable, scene, magnitude: 0.0, stack, scratch, walked }
+        Self { kernels: Kernels::Portable, scene, stack, scratch, walked }
     }
 
     fn single(&mut self, rays: &[Ray], hits: &mut [Candidate]) -> Done {
@@ -371,9 +370,9 @@ impl<'s> Fast<'s> {
 
     fn bundles(&mut self, rays: &[Ray], per_bundle: usize, hits: &mut [Candidate]) -> Done {
         let mut counts = Counts::default();
-        let Self { kernels, scene, magnitude, stack, scratch, walked } = self;
+        let Self { kernels, scene, stack, scratch, walked } = self;
         for (rays, hits) in rays.chunks(per_bundle).zip(hits.chunks_mut(per_bundle)) {
-            wide::nearest(*kernels, scene, *magnitude, rays, walked, scratch, stack, &mut counts);
+            wide::nearest(*kernels, scene, rays, walked, scratch, stack, &mut counts);
             for (hit, walked) in hits.iter_mut().zip(&*walked) {
                 *hit = walked.best.candidate;
             }
@@ -384,8 +383,7 @@ impl<'s> Fast<'s> {
     fn lists(&mut self, rays: &[Ray], per_bundle: usize, tally: &mut Tally) {
         let mut counts = Counts::default();
         for rays in rays.chunks(per_bundle) {
-            let list = Bundle::around(rays.iter(), self.magnitude)
-                .and_then(|bundle| self.scratch.clip(self.kernels, self.scene, &bundle, &mut counts).map(<[_]>::len));
+            let list = self.scratch.clip(self.kernels, self.scene, rays, &mut counts).map(Iterator::count);
             tally.without_list += u64::from(list.is_none());
             tally.listed += list.unwrap_or(0) as u64;
         }
