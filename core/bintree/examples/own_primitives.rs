@@ -3,6 +3,7 @@
 //! `cargo run -p hybray-bintree --features alloc --example own_primitives`
 
 use hybray_bintree::cut::{self, Cut, Primitives};
+use hybray_bintree::reinsert::{Link, reinsert};
 use hybray_bintree::walk::{self, Counts, Resident, Stack};
 use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::simd::Kernels;
@@ -57,6 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // 2. A binary tree over them.
     let mut binary = vec![BinaryNode::EMPTY; sah::nodes_for(items.len())];
     let used = sah::build(&mut items, &mut binary, &sah::Settings::default());
+    reinsert(&mut binary[..used], &mut vec![Link::EMPTY; used], 0);
 
     // 3. Pages of at most 16 KiB, and the directory above them.
     let (mut pages, mut entries, mut above) = (Vec::new(), Vec::new(), top::Builder::new());

@@ -44,7 +44,7 @@ pub fn bounds(items: &[Item]) -> Aabb {
 pub struct BinaryNode {
     /// By surface area: the box around its items. By midpoint: its cell.
     pub aabb: Aabb,
-    /// First of its items; those of its subtree stand together.
+    /// First of its items. Those of its subtree stand together until it is reinserted: then only a leaf's do.
     pub first: u32,
     /// How many.
     pub count: u32,

@@ -5,7 +5,7 @@
 //! side by side. The steps:
 //!
 //! 1. An [`Item`] for each primitive: its box, kind and number.
-//! 2. [`sah`] or [`midpoint`] makes a binary tree of [`BinaryNode`]s over them.
+//! 2. [`sah`] or [`midpoint`] makes a binary tree of [`BinaryNode`]s over them, which [`reinsert`](mod@reinsert) betters.
 //! 3. [`cut`] collapses it to wide nodes and cuts it into pages, and [`top`] puts the directory above them.
 //! 4. [`walk`] finds the nearest hit, or any hit, of a ray.
 //! 5. [`check()`] proves that a tree is what the walk needs.
@@ -20,6 +20,7 @@ pub mod check;
 mod collapse;
 pub mod cut;
 pub mod midpoint;
+pub mod reinsert;
 pub mod sah;
 pub mod top;
 pub mod walk;

@@ -25,7 +25,7 @@ impl Default for Settings {
     }
 }
 
-const BINS: usize = 16;
+const BINS: usize = 32;
 const STACK: usize = BINARY_DEPTH_MAX as usize + 1;
 
 /// Nodes that `items` items need at most.

@@ -136,11 +136,13 @@ fn depth_is_bounded() {
         let leaves_of_one = sah::Settings { leaf_max: 1, node_cost: 0.0, ..sah::Settings::default() };
         for start in [0, 30, 60, 70] {
             let settings = sah::Settings { depth: start, ..leaves_of_one };
-            let tree = tree(&shapes, Rule::Sah(settings));
-            let reached = start + depth(&tree.nodes);
-            let least = 32 - (count as u32).leading_zeros();
-            assert!(reached <= BINARY_DEPTH_MAX.max(start + least), "{count} from {start}: {reached}");
-            verified(&format!("{count} from {start}"), &shapes, &tree);
+            for rule in [Rule::Sah(settings), Rule::Moved(settings)] {
+                let tree = tree(&shapes, rule);
+                let reached = start + depth(&tree.nodes);
+                let least = 32 - (count as u32).leading_zeros();
+                assert!(reached <= BINARY_DEPTH_MAX.max(start + least), "{count} from {start}: {reached}");
+                verified(&format!("{count} from {start}"), &shapes, &tree);
+            }
         }
         for depth_max in [1, 24, 48, u32::MAX] {
             let rule = Rule::Midpoint(midpoint::Settings { depth_max, objects_max: 1 }, 8);

@@ -4,7 +4,8 @@ use super::packed::{hash_page, primitives_in};
 use super::{Rule, Settings};
 use bytemuck::allocation::zeroed_box;
 use hybray_bintree::cut::{self, Cut, CutError, Primitives};
-use hybray_bintree::{BinaryNode, Forest, Item, midpoint, sah};
+use hybray_bintree::reinsert::Link;
+use hybray_bintree::{BinaryNode, Forest, Item, midpoint, reinsert, sah};
 use hybray_geometry::Aabb;
 use hybray_scene::{Header, Line, PageView, Tables};
 use rayon::prelude::*;
@@ -79,10 +80,12 @@ fn surface_area<P: Primitives + Sync>(
     let chunks = parts
         .into_par_iter()
         .map_init(
-            || (Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
-            |(nodes, forests, scratch), part| {
+            || (Vec::new(), Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
+            |(nodes, links, forests, scratch), part| {
                 nodes.resize(sah::nodes_for(part.len()).max(nodes.len()), BinaryNode::EMPTY);
                 let used = sah::build(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
+                links.resize(used.max(links.len()), Link::EMPTY);
+                reinsert::reinsert(&mut nodes[..used], links, depth);
                 cut_chunk(&nodes[..used], part, source, page_bytes, forests, scratch)
             },
         )

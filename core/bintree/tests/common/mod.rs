@@ -5,6 +5,7 @@ pub mod scenes;
 
 use hybray_bintree::check::{Census, Coverage, Fault, check};
 use hybray_bintree::cut::{self, Cut, CutError, Primitives};
+use hybray_bintree::reinsert::{Link, reinsert};
 use hybray_bintree::walk::{Counts, Resident, Stack, nearest, occluded};
 use hybray_bintree::{BinaryNode, Forest, Item, midpoint, sah, top};
 use hybray_geometry::simd::Kernels;
@@ -128,6 +129,8 @@ impl Primitives for Shapes {
 #[derive(Clone, Copy, Debug)]
 pub enum Rule {
     Sah(sah::Settings),
+    /// The same, then reinsertion.
+    Moved(sah::Settings),
     /// Room for items: this many times their number, and 64.
     Midpoint(midpoint::Settings, usize),
 }
@@ -146,6 +149,11 @@ pub fn tree(shapes: &Shapes, rule: Rule) -> Tree {
             let used = sah::build(&mut items, &mut nodes, &settings);
             nodes.truncate(used);
             Tree { nodes, items }
+        }
+        Rule::Moved(settings) => {
+            let mut tree = tree(shapes, Rule::Sah(settings));
+            reinsert(&mut tree.nodes, &mut vec![Link::EMPTY; sah::nodes_for(shapes.all.len())], settings.depth);
+            tree
         }
         Rule::Midpoint(settings, room) => {
             let mut tree = cells(shapes, settings, room);
