@@ -25,6 +25,7 @@ impl Default for Settings {
     }
 }
 
+/// Bins on each axis at most.
 const BINS: usize = 32;
 const STACK: usize = BINARY_DEPTH_MAX as usize + 1;
 
@@ -142,23 +143,31 @@ struct Plane {
 struct Binning {
     lo: Vec3,
     scale: Vec3,
+    /// How many there are.
+    bins: usize,
 }
 
 impl Binning {
-    fn new(centroids: &Quad) -> Self {
+    /// Few items need few bins, which take longer than the items.
+    fn new(centroids: &Quad, count: u32) -> Self {
+        let bins = match count {
+            0..=16 => BINS / 4,
+            17..=128 => BINS / 2,
+            _ => BINS,
+        };
         let centroids = centroids.aabb();
         let extent = centroids.hi - centroids.lo;
         let scale = |e: f32| {
-            let s = BINS as f32 * (1.0 - 1e-6) / e;
+            let s = bins as f32 * (1.0 - 1e-6) / e;
             if s.is_finite() { s } else { 0.0 }
         };
-        Self { lo: centroids.lo, scale: Vec3::new(scale(extent.x), scale(extent.y), scale(extent.z)) }
+        Self { lo: centroids.lo, scale: Vec3::new(scale(extent.x), scale(extent.y), scale(extent.z)), bins }
     }
 
     #[inline(always)]
     fn bins(&self, item: &Item) -> [usize; 3] {
         let at = (centroid(item) - self.lo) * self.scale;
-        [at.x, at.y, at.z].map(|x| (x as u32 as usize).min(BINS - 1))
+        [at.x, at.y, at.z].map(|x| (x as u32 as usize).min(self.bins - 1))
     }
 }
 
@@ -183,7 +192,7 @@ fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings
     if depth + (32 - count.leading_zeros()) >= BINARY_DEPTH_MAX {
         return Some(items.len() / 2);
     }
-    let binning = Binning::new(centroids);
+    let binning = Binning::new(centroids, count);
     let plane = best_plane(items, &binning);
     let leaf_cost = blocks(count);
     let area = aabb.half_area();
@@ -202,6 +211,7 @@ fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings
 
 fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
     let mut bins = [[EMPTY; BINS]; 3];
+    let used = binning.bins;
     for item in items {
         let aabb = Quad::of(item.lo, item.hi);
         for (axis, bin) in binning.bins(item).into_iter().enumerate() {
@@ -214,12 +224,12 @@ fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
     for (axis, bins) in bins.iter().enumerate() {
         let mut above = [0.0; BINS];
         let mut sum = EMPTY;
-        for bin in (1..BINS).rev() {
+        for bin in (1..used).rev() {
             sum = merged(&sum, &bins[bin]);
             above[bin] = sum.aabb.half_area() * blocks(sum.count);
         }
         let mut sum = EMPTY;
-        for bin in 1..BINS {
+        for bin in 1..used {
             sum = merged(&sum, &bins[bin - 1]);
             let cost = sum.aabb.half_area() * blocks(sum.count) + above[bin];
             let separates = sum.count > 0 && sum.count < items.len() as u32;

@@ -103,12 +103,16 @@ pub fn build(model: &Model, settings: &Settings) -> Result<Packed, BuildError> {
         })
         .collect();
     let bounds = items.iter().fold(Aabb::EMPTY, |b, item| b.union(&item.aabb()));
-    let sample: Vec<Item> = items.iter().step_by(items.len().div_ceil(SAMPLE_MAX).max(1)).copied().collect();
-    let plan = Plan::new(settings.voxels, &bounds, &sample);
+    let plan = {
+        let stride = items.len().div_ceil(SAMPLE_MAX).max(1);
+        let is_wanted = matches!(settings.voxels, Voxels::Adaptive(_));
+        let sample: Vec<Item> = items.iter().step_by(stride).filter(|_| is_wanted).copied().collect();
+        Plan::new(settings.voxels, &bounds, &sample)
+    };
     let (mut voxels, held) = distribute(items, &plan);
 
     let mut assembler = Assembler::new(&plan);
-    let mut chunks: Vec<Vec<Line>> = Vec::new();
+    let mut pages: Vec<Vec<Line>> = Vec::new();
     // As many voxels at once as keep the processor busy; each is dropped when it is built.
     let steps = plan.above(&held);
     for steps in steps.chunks(4 * rayon::current_num_threads()) {
@@ -128,13 +132,13 @@ pub fn build(model: &Model, settings: &Settings) -> Result<Packed, BuildError> {
                 Step::Above(aabb) => assembler.above(aabb),
                 Step::Voxel(voxel) => {
                     for tree in trees.by_ref().take(1) {
-                        chunks.extend(assembler.voxel(*voxel, tree));
+                        pages.extend(assembler.voxel(*voxel, tree));
                     }
                 }
             }
         }
     }
-    Ok(Packed::new(assembler.finish(), chunks, scale_log2, model.materials.len()))
+    Ok(Packed::new(assembler.finish(), pages, scale_log2, model.materials.len()))
 }
 
 /// The items of each voxel, each with the part of its box in there, and the boxes around those.

@@ -47,13 +47,18 @@ const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
 /// zeros).
 #[must_use]
 pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
-    let length = (bytes.len() as u64).to_le_bytes();
-    bytes.chunks(8).chain([&length[..]]).fold(hash, |h, chunk| {
+    // The rotation brings what multiplication moves up back down.
+    let add = |h: u64, word: &[u8; 8]| {
+        (h ^ u64::from_le_bytes(*word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
+    };
+    let (words, rest) = bytes.as_chunks();
+    let mut hash = words.iter().fold(hash, add);
+    if !rest.is_empty() {
         let mut word = [0; 8];
-        word[..chunk.len()].copy_from_slice(chunk);
-        // The rotation brings what multiplication moves up back down.
-        (h ^ u64::from_le_bytes(word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
-    })
+        word[..rest.len()].copy_from_slice(rest);
+        hash = add(hash, &word);
+    }
+    add(hash, &(bytes.len() as u64).to_le_bytes())
 }
 
 /// The hash of a page.
@@ -292,7 +297,7 @@ impl Assembler {
         self.top.above(aabb);
     }
 
-    /// A voxel; returns its pages, chunk by chunk.
+    /// A voxel; returns its pages.
     pub fn voxel(&mut self, voxel: u32, tree: VoxelTree) -> impl Iterator<Item = Vec<Line>> + use<> {
         let mut chunks = tree.chunks.iter();
         for node in &tree.tops {
@@ -311,7 +316,7 @@ impl Assembler {
                 self.index.add_page(about.primitives, about.hash);
             }
         }
-        tree.chunks.into_iter().map(|chunk| chunk.lines)
+        tree.chunks.into_iter().flat_map(|chunk| chunk.pages)
     }
 
     /// The directory.

@@ -7,7 +7,7 @@ use hybray_bintree::cut::{self, Cut, CutError, Primitives};
 use hybray_bintree::reinsert::Link;
 use hybray_bintree::{BinaryNode, Forest, Item, midpoint, reinsert, sah};
 use hybray_geometry::Aabb;
-use hybray_scene::{Header, Line, PageView, Tables};
+use hybray_scene::{Line, PageView};
 use rayon::prelude::*;
 
 /// Items of a chunk: small enough for its scratch to stay in the cache, large enough to keep every core busy.
@@ -15,14 +15,13 @@ const CHUNK: u32 = 1 << 15;
 
 /// What became of a chunk: its pages, and the tree above them as events in preorder.
 pub(super) struct Chunk {
-    pub lines: Vec<Line>,
+    pub pages: Vec<Vec<Line>>,
     pub events: Vec<(Aabb, Option<PageAbout>)>,
 }
 
 /// What is kept of a page beside its lines.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PageAbout {
-    pub lines: u32,
     pub bytes: u32,
     /// Different primitives in it.
     pub primitives: u32,
@@ -65,7 +64,8 @@ fn surface_area<P: Primitives + Sync>(
 ) -> Result<VoxelTree, CutError> {
     let stop_at = sah::Settings { stop_at: CHUNK, depth, ..sah::Settings::default() };
     // Splits may cut off little at a time: where this room ends, a chunk is larger, and nothing else changes.
-    let mut tops = vec![BinaryNode::EMPTY; 4096 + 64 * (items.len() / CHUNK as usize)];
+    let chunks = items.len() / CHUNK as usize;
+    let mut tops = vec![BinaryNode::EMPTY; if chunks == 0 { 1 } else { 4096 + 64 * chunks }];
     let used = sah::build(items, &mut tops, &stop_at);
     tops.truncate(used);
 
@@ -80,17 +80,30 @@ fn surface_area<P: Primitives + Sync>(
     let chunks = parts
         .into_par_iter()
         .map_init(
-            || (Vec::new(), Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
-            |(nodes, links, forests, scratch), part| {
-                nodes.resize(sah::nodes_for(part.len()).max(nodes.len()), BinaryNode::EMPTY);
-                let used = sah::build(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
-                links.resize(used.max(links.len()), Link::EMPTY);
-                reinsert::reinsert(&mut nodes[..used], links, depth);
+            || (Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
+            |(nodes, forests, scratch), part| {
+                let used = built(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
+                reinsert::reinsert(&mut nodes[..used], &mut vec![Link::EMPTY; used], depth);
                 cut_chunk(&nodes[..used], part, source, page_bytes, forests, scratch)
             },
         )
         .collect::<Result<_, _>>()?;
     Ok(VoxelTree { tops, chunks })
+}
+
+/// A whole tree over `items` in `nodes`, and how many it took. Leaves are mostly full, so that half a node an item is nearly
+/// always room enough; where it is not, the tree is built again in all that there can be.
+fn built(items: &mut [Item], nodes: &mut Vec<BinaryNode>, settings: &sah::Settings) -> usize {
+    let all = sah::nodes_for(items.len());
+    for room in [(items.len() * 5 / 8 + 64).min(all), all] {
+        nodes.resize(room.max(nodes.len()), BinaryNode::EMPTY);
+        let used = sah::build(items, &mut nodes[..room], settings);
+        // Where a split found no room, one node is left over at most.
+        if used + 1 < room || room == all {
+            return used;
+        }
+    }
+    0
 }
 
 fn midpoints<P: Primitives>(
@@ -130,31 +143,17 @@ fn cut_chunk<P: Primitives>(
     forests: &mut Vec<Forest>,
     scratch: &mut cut::Scratch,
 ) -> Result<Chunk, CutError> {
-    let mut chunk = Chunk { lines: Vec::new(), events: Vec::new() };
+    let mut chunk = Chunk { pages: Vec::new(), events: Vec::new() };
     forests.resize(nodes.len().max(forests.len()), Forest::EMPTY);
     cut::pages(nodes, items, source, page_bytes, forests, scratch, &mut |aabb, cut| match cut {
         Cut::Above => chunk.events.push((*aabb, None)),
         Cut::Page(lines) => {
-            let header: &Header = bytemuck::from_bytes(&lines[0].0);
+            let page = PageView::of_valid(lines);
             let about =
-                PageAbout { lines: lines.len() as u32, bytes: header.bytes, primitives: 0, hash: hash_page(lines) };
+                PageAbout { bytes: page.header.bytes, primitives: primitives_in(&page), hash: hash_page(lines) };
             chunk.events.push((*aabb, Some(about)));
-            chunk.lines.extend_from_slice(lines);
+            chunk.pages.push(lines.to_vec());
         }
     })?;
-    // They stay: what they grew for and did not need goes back.
-    chunk.lines.shrink_to_fit();
-    count_primitives(&mut chunk);
     Ok(chunk)
-}
-
-fn count_primitives(chunk: &mut Chunk) {
-    let mut line = 0;
-    for about in chunk.events.iter_mut().filter_map(|(_, about)| about.as_mut()) {
-        let lines = &chunk.lines[line..][..about.lines as usize];
-        line += lines.len();
-        if let Ok(page) = PageView::parse(lines, Tables { materials: usize::MAX }) {
-            about.primitives = primitives_in(&page);
-        }
-    }
 }
