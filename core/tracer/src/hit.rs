@@ -4,7 +4,7 @@ use hybray_bintree::cut::FLAT;
 use hybray_bintree::walk::Hit;
 use hybray_geometry::{Ray, RayKernel, SurfacePoint, Vec3, gamma};
 use hybray_scene::{BLOCK, Kind, PageView, Slot};
-use hybray_shading::{Surface, id, unpack_normal};
+use hybray_shading::{Child, Surface, id, spawn, unpack_normal};
 use hybray_wire::RayRecord;
 
 /// Whom a ray and its children are traced for.
@@ -101,11 +101,24 @@ impl HitRecord {
         }
     }
 
-    /// The id of a child that is traced now: the record's entry will add it.
-    pub(crate) fn adopt(&mut self, branch: u32) -> u64 {
-        let id = id::child_id(self.id, branch);
+    /// The child at `cursor`.
+    pub(crate) fn child(&self, shading: &hybray_shading::Scene<'_>, cursor: u32) -> Child {
+        spawn::child(shading, &self.surface, self.weight, u32::from(self.depth), self.id, cursor)
+    }
+
+    /// The id of a child.
+    pub(crate) fn child_id(&self, branch: u32) -> u64 {
+        id::child_id(self.id, branch)
+    }
+
+    /// A child of this id is traced now: the record's entry will add it.
+    pub(crate) fn adopt(&mut self, id: u64) {
         self.children = self.children.wrapping_add(id);
-        id
+    }
+
+    /// What the ray's ledger entry adds once all children have been adopted.
+    pub(crate) fn entry(&self) -> u64 {
+        self.children.wrapping_sub(self.id)
     }
 }
 

@@ -233,7 +233,7 @@ impl<'r> Lane<'r> {
         let record = &mut self.records[top];
         record.pass_over_done();
         if record.cursor == record.end {
-            sink.ended(&record.origin, record.children.wrapping_sub(record.id));
+            sink.ended(&record.origin, record.entry());
             self.depth = top;
             return None;
         }
@@ -242,9 +242,41 @@ impl<'r> Lane<'r> {
         }
         let cursor = record.cursor;
         record.advance();
-        let depth = u32::from(record.depth);
-        let child = spawn::child(&scene.shading, &record.surface, record.weight, depth, record.id, cursor);
-        let (kind, start, direction, t_max, weight, medium, branch) = match child {
+        let spawned = Spawned::of(&record.child(&scene.shading, cursor))?;
+        let ray = spawned.record(record);
+        record.adopt(ray.id);
+        match spawned.kind {
+            RayKind::Shadow => counts.shadow += 1,
+            _ => counts.secondary += 1,
+        }
+        self.take(scene, walker, ray, sink, counts)
+    }
+}
+
+/// A ray that a hit spawns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spawned {
+    pub kind: RayKind,
+    /// From where, whereto, and how far.
+    pub ray: Ray,
+    /// Times its radiance, if it is a shadow ray.
+    pub weight: [f32; 3],
+    pub medium: u16,
+    pub branch: u32,
+}
+
+impl Spawned {
+    /// What fills unused room.
+    pub(crate) const EMPTY: Self = Self {
+        kind: RayKind::Shadow,
+        ray: Ray { origin: Vec3::ZERO, direction: Vec3::Z, t_min: 0.0, t_max: 0.0 },
+        weight: [0.0; 3],
+        medium: 0,
+        branch: 0,
+    };
+
+    pub(crate) fn of(child: &Child) -> Option<Self> {
+        let (kind, origin, direction, t_max, weight, medium, branch) = match *child {
             Child::None => return None,
             Child::Shadow { origin, direction, t_max, contribution, branch } => {
                 (RayKind::Shadow, origin, direction, t_max, contribution, 0, branch)
@@ -256,18 +288,19 @@ impl<'r> Lane<'r> {
                 (RayKind::Refract, origin, direction, f32::INFINITY, weight, medium, branch)
             }
         };
-        let id = record.adopt(branch);
-        let origin = record.origin;
-        let depth = match kind {
-            RayKind::Shadow => record.depth,
-            _ => record.depth + 1,
-        };
-        let ray = RayRecord {
-            origin: start.to_array(),
-            direction: direction.to_array(),
-            t_max,
-            t_end: t_max,
-            id,
+        Some(Self { kind, ray: Ray { origin, direction, t_min: 0.0, t_max }, weight, medium, branch })
+    }
+
+    /// As it travels from a hit.
+    pub(crate) fn record(&self, hit: &HitRecord) -> RayRecord {
+        let Self { kind, ray, weight, medium, branch } = *self;
+        let origin = hit.origin;
+        RayRecord {
+            origin: ray.origin.to_array(),
+            direction: ray.direction.to_array(),
+            t_max: ray.t_max,
+            t_end: ray.t_max,
+            id: hit.child_id(branch),
             primitive: Candidate::NOTHING,
             weight,
             pixel: origin.pixel,
@@ -277,14 +310,9 @@ impl<'r> Lane<'r> {
             page: FROM_ROOT,
             medium,
             kind: kind as u8,
-            depth,
+            depth: hit.depth + u8::from(kind != RayKind::Shadow),
             ..RayRecord::zeroed()
-        };
-        match kind {
-            RayKind::Shadow => counts.shadow += 1,
-            _ => counts.secondary += 1,
         }
-        self.take(scene, walker, ray, sink, counts)
     }
 }
 

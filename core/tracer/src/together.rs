@@ -1,19 +1,19 @@
-//! Shadow rays that go to one place, or come from one, traced as a bundle: those of several hits to one light, or those of
-//! one hit to the samples of an area light.
+//! Rays traced as a bundle: shadow rays of several hits to one light, or of one hit to the samples of an area light, and
+//! what several hits mirror.
 //!
 //! Each is the ray that its hit would send in its turn, and brings the same. A ray whose answer the pages at hand do not
 //! give is left to its turn, and is walked singly then.
 
 use crate::hit::HitRecord;
-use crate::lane::{Sink, Walker, add};
+use crate::lane::{Sink, Spawned, Walker, add, begin};
 use crate::scene::Scene;
 use core::ops::Range;
 use hybray_bintree::walk::{Hit, Walked};
-use hybray_geometry::{Ray, Vec3};
+use hybray_geometry::Ray;
 use hybray_pyraclip::{shadow, wide};
 use hybray_scene::Pages;
-use hybray_shading::{Child, spawn};
-use hybray_wire::Counts;
+use hybray_shading::spawn;
+use hybray_wire::{Counts, RayKind};
 
 /// Shadow rays that are traced together at most.
 pub const TOGETHER: usize = shadow::RAYS_MAX;
@@ -31,12 +31,11 @@ pub struct Together {
     pub scratch: wide::Scratch,
 }
 
-/// Whose shadow ray it is, and what it brings.
+/// Whose ray it is.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
-    contribution: [f32; 3],
     record: u16,
-    branch: u32,
+    spawned: Spawned,
 }
 
 impl Together {
@@ -44,9 +43,9 @@ impl Together {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            rays: [Ray { origin: Vec3::ZERO, direction: Vec3::Z, t_min: 0.0, t_max: 0.0 }; TOGETHER],
+            rays: [Spawned::EMPTY.ray; TOGETHER],
             walked: [Walked { best: Hit::none(0.0), needs: None }; TOGETHER],
-            sent: [Sent { contribution: [0.0; 3], record: 0, branch: 0 }; TOGETHER],
+            sent: [Sent { record: 0, spawned: Spawned::EMPTY }; TOGETHER],
             scratch: wide::Scratch::new(),
         }
     }
@@ -104,6 +103,78 @@ impl Walker<'_> {
     ) {
         trace(scene, self, records, cursor..cursor + 1, sink, counts);
     }
+
+    /// The last ray of each of `records` that has only one left to spawn, as far as pages at hand tell what it hits: that
+    /// hit's record takes its parent's place. Returns how many records are left as they were, which come first then, and
+    /// how many there are with the new ones behind them.
+    ///
+    /// # Panics
+    /// If there are more than [`TOGETHER`].
+    pub fn follow<S: Sink, P: Pages + ?Sized>(
+        &mut self,
+        scene: &Scene<'_, P>,
+        records: &mut [HitRecord],
+        sink: &mut S,
+        counts: &mut Counts,
+    ) -> (usize, usize) {
+        let mut count = 0;
+        let Together { rays, sent, .. } = &mut *self.together;
+        for (at, record) in records.iter_mut().enumerate() {
+            record.pass_over_done();
+            let left = record.end.saturating_sub(record.cursor);
+            if left > 1 {
+                continue;
+            }
+            let last = (left == 1).then(|| record.child(&scene.shading, record.cursor));
+            match last.and_then(|child| Spawned::of(&child)) {
+                // Its turn has not come: its light is behind glass, or behind a page that is not at hand.
+                Some(spawned) if spawned.kind == RayKind::Shadow => {}
+                Some(spawned) => {
+                    rays[count] = spawned.ray;
+                    sent[count] = Sent { record: at as u16, spawned };
+                    count += 1;
+                }
+                None => {
+                    sink.ended(&record.origin, record.entry());
+                    *record = HitRecord::EMPTY;
+                }
+            }
+        }
+        let Together { rays, walked, sent, scratch } = &mut *self.together;
+        let (kernels, resident) = (self.kernels, &scene.resident);
+        wide::nearest(kernels, resident, &rays[..count], walked, scratch, self.stack, &mut self.counts);
+        self.ahead += count as u64;
+        let mut new = [false; TOGETHER];
+        for (sent, walked) in sent[..count].iter().zip(walked) {
+            let at = usize::from(sent.record);
+            let record = &mut records[at];
+            if walked.needs.is_some() {
+                continue;
+            }
+            let ray = sent.spawned.record(record);
+            record.adopt(ray.id);
+            counts.secondary += 1;
+            sink.ended(&record.origin, record.entry());
+            *record = begin(scene, &ray, &walked.best, sink, counts).unwrap_or(HitRecord::EMPTY);
+            new[at] = true;
+        }
+        let (mut stay, mut all) = (0, 0);
+        for at in 0..records.len() {
+            let record = records[at];
+            if record.depth == HitRecord::EMPTY.depth {
+                continue;
+            }
+            let mut to = all;
+            if !new[at] {
+                records.copy_within(stay..all, stay + 1);
+                to = stay;
+                stay += 1;
+            }
+            records[to] = record;
+            all += 1;
+        }
+        (stay, all)
+    }
 }
 
 /// Shadow rays at `cursors`, all within the same 64, of each of `records`.
@@ -118,12 +189,11 @@ fn trace<S: Sink, P: Pages + ?Sized>(
     let Together { rays, walked, sent, scratch } = &mut *walker.together;
     let mut count = 0;
     for (at, record) in records.iter_mut().enumerate() {
-        let depth = u32::from(record.depth);
         for cursor in cursors.clone() {
-            match spawn::child(&scene.shading, &record.surface, record.weight, depth, record.id, cursor) {
-                Child::Shadow { origin, direction, t_max, contribution, branch } => {
-                    rays[count] = Ray { origin, direction, t_min: 0.0, t_max };
-                    sent[count] = Sent { contribution, record: at as u16, branch };
+            match Spawned::of(&record.child(&scene.shading, cursor)) {
+                Some(spawned) if spawned.kind == RayKind::Shadow => {
+                    rays[count] = spawned.ray;
+                    sent[count] = Sent { record: at as u16, spawned };
                     count += 1;
                 }
                 _ => record.done |= 1 << (cursor % 64),
@@ -145,10 +215,10 @@ fn trace<S: Sink, P: Pages + ?Sized>(
         let arrived = if walked.needs.is_some() {
             continue;
         } else if !hit.candidate.is_hit() {
-            sent.contribution
+            sent.spawned.weight
         } else if scene.transmits {
             let Some(page) = resident.pages.page(hit.page) else { continue };
-            if spawn::let_through(&scene.shading, page.material(hit.slot), sent.contribution).is_some() {
+            if spawn::let_through(&scene.shading, page.material(hit.slot), sent.spawned.weight).is_some() {
                 continue;
             }
             [0.0; 3]
@@ -156,8 +226,10 @@ fn trace<S: Sink, P: Pages + ?Sized>(
             [0.0; 3]
         };
         let record = &mut records[usize::from(sent.record)];
-        record.done |= 1 << ((sent.branch - 1) % 64);
-        let id = record.adopt(sent.branch);
+        let branch = sent.spawned.branch;
+        record.done |= 1 << ((branch - 1) % 64);
+        let id = record.child_id(branch);
+        record.adopt(id);
         counts.shadow += 1;
         add(sink, &record.origin, arrived);
         sink.ended(&record.origin, id.wrapping_neg());

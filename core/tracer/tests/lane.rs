@@ -229,10 +229,10 @@ fn a_ledger_with_a_fault_stays_open() {
     });
 }
 
-/// Hits that stand together, and samples of lights: no ray is sent twice, and none is left out.
+/// Hits that stand together, samples of lights, and what is seen in mirrors: no ray is sent twice, and none is left out.
 #[test]
-fn shadow_rays_together_bring_what_they_bring_singly() {
-    let (mut answered, mut asked) = (0, 0);
+fn rays_together_bring_what_they_bring_singly() {
+    let (mut answered, mut asked, mut followed) = (0, 0, 0);
     for world in [hall(), hall().opaque(), hall().softly_lit(), hall().softly_lit().opaque()] {
         world.with(|scene| {
             let (mut together, mut counts, mut scratch) = (Record::default(), Counts::default(), Room::default());
@@ -252,14 +252,25 @@ fn shadow_rays_together_bring_what_they_bring_singly() {
             }
             assert_eq!(records.len(), TOGETHER);
             let before = walker.ahead;
-            for cursor in (0..64).filter(|&cursor| goes_together(scene, cursor)) {
-                walker.shadows(scene, &mut records, cursor, &mut together, &mut counts);
+            let mut left = Vec::new();
+            while !records.is_empty() {
+                for cursor in (0..64).filter(|&cursor| goes_together(scene, cursor)) {
+                    walker.shadows(scene, &mut records, cursor, &mut together, &mut counts);
+                }
+                let depth = records[0].depth;
+                let (stay, all) = walker.follow(scene, &mut records, &mut together, &mut counts);
+                records.truncate(all);
+                let new = records.split_off(stay);
+                assert!(records.iter().all(|r| r.depth == depth) && new.iter().all(|r| r.depth == depth + 1));
+                left.append(&mut records);
+                records = new;
             }
             answered += counts.shadow;
-            asked += walker.ahead - before;
+            asked += walker.ahead - before - counts.secondary;
+            followed += counts.secondary;
             let mut room = [HitRecord::EMPTY; 5];
             let mut lane = Lane::new(&mut room);
-            for record in records {
+            for record in left {
                 lane.push(record);
                 while !lane.is_empty() {
                     assert_eq!(lane.step(scene, &mut walker, &mut together, &mut counts), None);
@@ -272,6 +283,7 @@ fn shadow_rays_together_bring_what_they_bring_singly() {
         });
     }
     assert!(answered > 300 && asked > answered + 10, "{asked} asked, {answered} answered");
+    assert!(followed > 20, "{followed}");
 }
 
 #[test]

@@ -48,9 +48,8 @@ const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
 #[must_use]
 pub fn hash_bytes(hash: u64, bytes: &[u8]) -> u64 {
     // The rotation brings what multiplication moves up back down.
-    let add = |h: u64, word: &[u8; 8]| {
-        (h ^ u64::from_le_bytes(*word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29)
-    };
+    let add =
+        |h: u64, word: &[u8; 8]| (h ^ u64::from_le_bytes(*word)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
     let (words, rest) = bytes.as_chunks();
     let mut hash = words.iter().fold(hash, add);
     if !rest.is_empty() {

@@ -168,15 +168,20 @@ enum Stage {
     Shading { sample: u16, next: usize, end: usize },
 }
 
-/// Hits of the bundle whose shadow rays are traced together: records that the lane takes over one by one.
+/// Hits of the bundle whose rays are traced together, and those of their last children in their place, and so on. What can
+/// not be traced so goes to the lane, record by record.
 #[derive(Clone, Copy, Default)]
 struct Lit {
     /// Records.
     count: usize,
-    /// Shadow rays of each that had their turn.
-    cursor: u32,
-    /// Records that the lane has taken over; none before all shadow rays had their turn.
+    /// Records that are for the lane: the first ones.
+    lane: usize,
+    /// Records that the lane has taken over.
     taken: usize,
+    /// Shadow rays of each of the others that had their turn.
+    cursor: u32,
+    /// Whether there is no more room, or there are no more.
+    full: bool,
 }
 
 /// A page that was asked for, or is to be.
@@ -506,20 +511,25 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             }
             match self.stage {
                 Stage::Shading { next, end, .. }
-                    if self.lit.count > self.lit.taken && (next == end || self.lit.count == lit.len()) =>
+                    if self.lit.full || self.lit.count > 0 && (next == end || self.lit.count == lit.len()) =>
                 {
-                    let Lit { count, cursor, taken } = &mut self.lit;
-                    if *cursor < shadows {
+                    let Lit { count, lane: to_lane, taken, cursor, full } = &mut self.lit;
+                    *full = true;
+                    if taken < to_lane {
+                        lane.push(lit[*taken]);
+                        *taken += 1;
+                    } else if to_lane == count {
+                        self.lit = Lit::default();
+                    } else if *cursor < shadows {
                         if goes_together(&scene, *cursor) {
-                            walker.shadows(&scene, &mut lit[..*count], *cursor, &mut sums, &mut counts);
+                            walker.shadows(&scene, &mut lit[*to_lane..*count], *cursor, &mut sums, &mut counts);
                         }
                         *cursor += 1;
-                        continue;
-                    }
-                    lane.push(lit[*taken]);
-                    *taken += 1;
-                    if taken == count {
-                        self.lit = Lit::default();
+                    } else if way.is_some() {
+                        *to_lane = *count;
+                    } else {
+                        let (stay, all) = walker.follow(&scene, &mut lit[*to_lane..*count], &mut sums, &mut counts);
+                        (*to_lane, *count, *cursor) = (*to_lane + stay, *to_lane + all, 0);
                     }
                 }
                 Stage::Shading { sample, next, end } if next < end => {
