@@ -16,7 +16,7 @@ use hybray_tests::{Random, camera_rays, close_rays, scene, soup, walls};
 
 /// Every leaf of every page: page, packed child, box.
 fn leaves(scene: &Resident<'_>) -> Vec<(u32, u32, Aabb)> {
-    let nodes = (0..).zip(scene.pages).flat_map(|(page, view)| view.nodes.iter().map(move |node| (page, node)));
+    let nodes = (0..).zip(scene.pages).flat_map(|(page, view)| view.body.nodes().map(move |node| (page, node)));
     nodes
         .flat_map(|(page, node)| node.children().map(move |(slot, child)| (page, child, node.aabb(slot))))
         .filter(|(_, child, _)| matches!(child, Child::Leaf { kind: Kind::Triangle | Kind::Sphere | Kind::Cone, .. }))

@@ -8,7 +8,7 @@ use hybray_bintree::walk::{self, Counts, Resident, Stack};
 use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Cone, Ray, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Kind, Node, PageEntry, PageView, Tables};
+use hybray_scene::{Directory, Kind, Node, PageEntry, PageForm, PageView, Tables};
 
 /// The caller's own data. Ids: the triangles first, then the balls.
 struct Garden {
@@ -64,14 +64,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut pages, mut entries, mut above) = (Vec::new(), Vec::new(), top::Builder::new());
     let mut scratch = Box::<cut::Scratch>::default();
     let mut forests = vec![Forest::EMPTY; used];
-    cut::pages(&binary[..used], &items, &garden, 16 * 1024, &mut forests, &mut scratch, &mut |aabb, cut| match cut {
-        Cut::Above => above.above(aabb),
-        Cut::Page(lines) => {
-            above.page(aabb, pages.len() as u32);
-            entries.push(PageEntry { bytes: 64 * lines.len() as u32, owner: 0, kind: 0 });
-            pages.push(lines.to_vec());
-        }
-    })?;
+    cut::pages(
+        &binary[..used],
+        &items,
+        &garden,
+        16 * 1024,
+        PageForm::Full,
+        &mut forests,
+        &mut scratch,
+        &mut |aabb, cut| match cut {
+            Cut::Above => above.above(aabb),
+            Cut::Page(lines) => {
+                above.page(aabb, pages.len() as u32);
+                entries.push(PageEntry { bytes: 64 * lines.len() as u32, owner: 0, kind: 0 });
+                pages.push(lines.to_vec());
+            }
+        },
+    )?;
     let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
     let above = above.finish();
     forests.resize(above.len(), Forest::EMPTY);

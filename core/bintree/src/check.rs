@@ -2,7 +2,7 @@
 
 use crate::walk::Resident;
 use hybray_geometry::Aabb;
-use hybray_scene::{BLOCK, Child, Kind, PageView};
+use hybray_scene::{BLOCK, Child, CompactNode, Form, Kind, Node, PAGE_BYTES_MAX, PageForm, PageView};
 
 /// What a whole tree holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,7 +72,10 @@ pub fn check(scene: &Resident<'_>, found: &mut [Coverage], seen: &mut [u32]) -> 
                 Child::Page(page) => {
                     let view = scene.pages.get(page as usize).ok_or(Fault::Page { page, times: 0 })?;
                     seen[page as usize] += 1;
-                    view.nodes[0].bounds()
+                    match view.body.form() {
+                        PageForm::Full => view.body.node(0, &mut { Node::EMPTY }).bounds(),
+                        PageForm::Compact => Aabb { lo: view.header.lo.into(), hi: view.header.hi.into() },
+                    }
                 }
                 Child::Leaf { .. } | Child::Unused => Aabb::EMPTY,
             };
@@ -94,15 +97,22 @@ pub fn check(scene: &Resident<'_>, found: &mut [Coverage], seen: &mut [u32]) -> 
 }
 
 fn check_page(page: u32, view: &PageView<'_>, found: &mut [Coverage], census: &mut Census) -> Result<(), Fault> {
-    census.nodes += view.nodes.len() as u64;
+    census.nodes += view.body.nodes().len() as u64;
     census.bytes += u64::from(view.header.bytes);
-    for (index, node) in view.nodes.iter().enumerate() {
+    let compact = view.body.form() == PageForm::Compact;
+    // A compact node's boxes are larger than what they were made of, and may reach out of their parent's: what counts is what
+    // all boxes on the way to a leaf have in common.
+    let mut common = [Aabb { lo: view.header.lo.into(), hi: view.header.hi.into() }; NODES_MAX];
+    let mut room = Node::EMPTY;
+    for (index, node) in view.body.nodes().enumerate() {
         for (slot, child) in node.children() {
-            let aabb = node.aabb(slot);
+            let own = node.aabb(slot);
+            let aabb = if compact { own.intersection(&common[index]) } else { own };
             let fault = Fault::Box { page: Some(page), node: index, slot };
             match child {
                 Child::Inner(next) => {
-                    if !aabb.contains(&view.nodes[next as usize].bounds()) {
+                    common[next as usize] = aabb;
+                    if !compact && !own.contains(&view.body.node(next as usize, &mut room).bounds()) {
                         return Err(fault);
                     }
                 }
@@ -125,6 +135,9 @@ fn check_page(page: u32, view: &PageView<'_>, found: &mut [Coverage], census: &m
     Ok(())
 }
 
+/// Nodes of a page at most.
+const NODES_MAX: usize = PAGE_BYTES_MAX / size_of::<CompactNode>();
+
 /// The primitives of a leaf with their ids and boxes.
 pub fn leaf_primitives<'a>(
     view: &'a PageView<'a>,
@@ -134,10 +147,7 @@ pub fn leaf_primitives<'a>(
 ) -> impl Iterator<Item = (u32, Aabb)> + 'a {
     let lanes = if kind == Kind::Cone { 1 } else { BLOCK };
     (start * lanes..(start + count) * lanes).map(move |i| match kind {
-        Kind::Triangle => {
-            let block = &view.triangles[i / BLOCK];
-            (block.id[i % BLOCK], block.get(i % BLOCK).aabb())
-        }
+        Kind::Triangle => (view.body.triangle_id(i), view.body.triangle(i).aabb()),
         Kind::Sphere => {
             let block = &view.spheres[i / BLOCK];
             (block.id[i % BLOCK], block.get(i % BLOCK).aabb())

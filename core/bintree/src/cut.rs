@@ -6,7 +6,8 @@ use crate::collapse::{Binary, Forest, Full, above, apiece, collapse};
 use bytemuck::Zeroable;
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle};
 use hybray_scene::{
-    BLOCK, Child, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, SphereBlock, TriangleBlock, lines_for,
+    BLOCK, Child, CompactNode, CompactTriangles, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, PageForm,
+    SphereBlock, TriangleBlock, lines_for,
 };
 
 /// The caller's primitives, by [`Item::id`].
@@ -27,21 +28,31 @@ pub trait Primitives {
     fn normals(&self, id: u32) -> Option<[u32; 3]>;
 }
 
-const NODES_MAX: usize = PAGE_BYTES_MAX / size_of::<Node>();
+const NODES_MAX: usize = PAGE_BYTES_MAX / size_of::<CompactNode>();
 const TRIANGLES_MAX: usize = PAGE_BYTES_MAX / size_of::<TriangleBlock>();
+const COMPACT_MAX: usize = PAGE_BYTES_MAX / size_of::<CompactTriangles>();
+const VERTICES_MAX: usize = PAGE_BYTES_MAX / size_of::<[f32; 3]>();
+/// Places for vertices to be found again: enough for few to collide.
+const FOUND_MAX: usize = 2 * VERTICES_MAX.next_power_of_two();
 const SPHERES_MAX: usize = PAGE_BYTES_MAX / size_of::<SphereBlock>();
 const CONES_MAX: usize = PAGE_BYTES_MAX / size_of::<ConeRecord>();
 /// Blocks of primitives in a leaf at most: longer ones are halved.
 const LEAF_BLOCKS: u32 = 4;
-/// Least bytes that a primitive takes in a page.
-const PRIMITIVE_BYTES_MIN: usize = 20;
+/// Least bytes that a primitive takes in a page: a sphere in a block, a compact triangle whose vertices others have, too.
+const fn primitive_bytes_min(form: PageForm) -> usize {
+    match form {
+        PageForm::Full => size_of::<SphereBlock>() / BLOCK,
+        PageForm::Compact => size_of::<CompactTriangles>() / BLOCK,
+    }
+}
 
-/// A page under construction: about 340 KB of scratch, so keep one and use it again. All zeros is a good beginning
+/// A page under construction: about 740 KB of scratch, so keep one and use it again. All zeros is a good beginning
 /// ([`bytemuck::Zeroable`]): too large for a stack, it is best zeroed where it lies.
 #[derive(Clone, Copy, Zeroable)]
 #[repr(C)]
 pub struct Scratch {
     nodes: [Node; NODES_MAX],
+    compact_nodes: [CompactNode; NODES_MAX],
     contents: Contents,
     page: [Line; PAGE_BYTES_MAX / 64],
 }
@@ -51,13 +62,54 @@ pub struct Scratch {
 #[repr(C)]
 struct Contents {
     triangles: [TriangleBlock; TRIANGLES_MAX],
+    compact: [CompactTriangles; COMPACT_MAX],
+    shared: Vertices,
     spheres: [SphereBlock; SPHERES_MAX],
     cones: [ConeRecord; CONES_MAX],
     normals: [[u32; 3]; TRIANGLES_MAX * BLOCK],
-    triangle_materials: [u16; TRIANGLES_MAX * BLOCK],
+    triangle_materials: [u16; COMPACT_MAX * BLOCK],
     sphere_materials: [u16; SPHERES_MAX * BLOCK],
     cone_materials: [u16; CONES_MAX],
 }
+
+/// Vertices that triangles share, with their normals.
+#[derive(Clone, Copy, Zeroable)]
+#[repr(C)]
+struct Vertices {
+    vertices: [[f32; 3]; VERTICES_MAX],
+    normals: [u32; VERTICES_MAX],
+    /// Numbers of vertices, plus one, by hash; 0 is none. A vertex lies at the first free place from its hash on.
+    found: [u16; FOUND_MAX],
+}
+
+impl Vertices {
+    /// The number of a vertex with this normal among the `count` that there are, after which it is put if it is new;
+    /// `None` if there is no room.
+    fn number(&mut self, vertex: [f32; 3], normal: u32, count: &mut u32) -> Option<u16> {
+        let bits = vertex.map(f32::to_bits);
+        // Fibonacci hashing (Knuth, The Art of Computer Programming, volume 3, section 6.4) of each word.
+        let hash = bits
+            .iter()
+            .chain([&normal])
+            .fold(0u64, |h, &word| (h ^ u64::from(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
+        let mut at = hash as usize % FOUND_MAX;
+        while let Some(number) = self.found[at].checked_sub(1) {
+            let there = usize::from(number);
+            if self.vertices[there].map(f32::to_bits) == bits && self.normals[there] == normal {
+                return Some(number);
+            }
+            at = (at + 1) % FOUND_MAX;
+        }
+        let number = *count as u16;
+        *self.vertices.get_mut(usize::from(number))? = vertex;
+        self.normals[usize::from(number)] = normal;
+        self.found[at] = number + 1;
+        *count += 1;
+        Some(number)
+    }
+}
+
+const _: () = assert!(FOUND_MAX > VERTICES_MAX && VERTICES_MAX < u16::MAX as usize);
 
 impl Default for Scratch {
     fn default() -> Self {
@@ -176,6 +228,23 @@ impl<P: Primitives> Binary for Filling<'_, P> {
         // Lanes beyond the last item repeat it.
         let lanes = (0..blocks * BLOCK).map(|i| (i / BLOCK, i % BLOCK, items[i.min(items.len() - 1)].id));
         let (start, count) = match kind {
+            Kind::Triangle if self.counts.form() == PageForm::Compact => {
+                let start = self.counts.triangle_blocks as usize;
+                let room = c.compact.get_mut(start..start + blocks)?;
+                for (block, lane, id) in lanes {
+                    c.triangle_materials[(start + block) * BLOCK + lane] = self.source.material(id);
+                    let normals = self.source.normals(id);
+                    self.smooth |= normals.is_some();
+                    let (triangle, normals) = (self.source.triangle(id), normals.unwrap_or([FLAT; 3]));
+                    for (i, vertex) in triangle.v.into_iter().enumerate() {
+                        let number = c.shared.number(vertex.to_array(), normals[i], &mut self.counts.vertices)?;
+                        room[block].v[i][lane] = number;
+                    }
+                    room[block].id[lane] = self.source.id(id);
+                }
+                self.counts.triangle_blocks += blocks as u32;
+                (start, blocks)
+            }
             Kind::Triangle => {
                 let start = self.counts.triangle_blocks as usize;
                 let room = c.triangles.get_mut(start..start + blocks)?;
@@ -228,27 +297,33 @@ fn fill<P: Primitives>(
     part: &Part,
     source: &P,
     bytes_max: usize,
+    form: PageForm,
     scratch: &mut Scratch,
 ) -> Result<usize, Full> {
-    if part.count as usize * PRIMITIVE_BYTES_MIN > bytes_max {
+    if part.count as usize * primitive_bytes_min(form) > bytes_max {
         return Err(Full);
     }
-    let Scratch { nodes, contents, page } = scratch;
-    let mut header = Header {
-        magic: Header::MAGIC,
-        materials: 1,
-        lo: part.aabb.lo.to_array(),
-        hi: part.aabb.hi.to_array(),
-        ..Zeroable::zeroed()
+    let Scratch { nodes, compact_nodes, contents, page } = scratch;
+    let magic = match form {
+        PageForm::Full => Header::MAGIC,
+        PageForm::Compact => Header::MAGIC_COMPACT,
     };
+    let mut header =
+        Header { magic, materials: 1, lo: part.aabb.lo.to_array(), hi: part.aabb.hi.to_array(), ..Zeroable::zeroed() };
+    contents.shared.found.fill(0);
     let mut filling = Filling { subject, source, contents, counts: header, smooth: false, bytes_max };
     header.nodes = collapse(&mut filling, *part, nodes)? as u32;
     let (counts, smooth) = (filling.counts, filling.smooth);
     header.triangle_blocks = counts.triangle_blocks;
     header.sphere_blocks = counts.sphere_blocks;
     header.cones = counts.cones;
+    header.vertices = counts.vertices;
     let (nt, ns, nc) = (counts.triangle_blocks as usize, counts.sphere_blocks as usize, counts.cones as usize);
-    header.normals = if smooth { (nt * BLOCK) as u32 } else { 0 };
+    header.normals = match form {
+        _ if !smooth => 0,
+        PageForm::Full => (nt * BLOCK) as u32,
+        PageForm::Compact => header.vertices,
+    };
     let materials = [
         &contents.triangle_materials[..nt * BLOCK],
         &contents.sphere_materials[..ns * BLOCK],
@@ -262,6 +337,17 @@ fn fill<P: Primitives>(
         return Err(Full);
     }
     header.bytes = bytes as u32;
+    let nodes = &nodes[..header.nodes as usize];
+    let compact_nodes = &mut compact_nodes[..header.nodes as usize];
+    if form == PageForm::Compact {
+        for (to, node) in compact_nodes.iter_mut().zip(nodes) {
+            let Some(compact) = CompactNode::new(node) else {
+                // No steps hold these boxes: this page is a full one.
+                return fill(subject, part, source, bytes_max, PageForm::Full, scratch);
+            };
+            *to = compact;
+        }
+    }
 
     let page: &mut [u8] = bytemuck::cast_slice_mut(&mut page[..]);
     let mut at = 0;
@@ -270,11 +356,23 @@ fn fill<P: Primitives>(
         at += bytes.len();
     };
     put(bytemuck::bytes_of(&header));
-    put(bytemuck::cast_slice(&nodes[..header.nodes as usize]));
-    put(bytemuck::cast_slice(&contents.triangles[..nt]));
-    put(bytemuck::cast_slice(&contents.spheres[..ns]));
-    put(bytemuck::cast_slice(&contents.cones[..nc]));
-    put(bytemuck::cast_slice(&contents.normals[..header.normals as usize]));
+    match form {
+        PageForm::Full => {
+            put(bytemuck::cast_slice(nodes));
+            put(bytemuck::cast_slice(&contents.triangles[..nt]));
+            put(bytemuck::cast_slice(&contents.spheres[..ns]));
+            put(bytemuck::cast_slice(&contents.cones[..nc]));
+            put(bytemuck::cast_slice(&contents.normals[..header.normals as usize]));
+        }
+        PageForm::Compact => {
+            put(bytemuck::cast_slice(compact_nodes));
+            put(bytemuck::cast_slice(&contents.spheres[..ns]));
+            put(bytemuck::cast_slice(&contents.compact[..nt]));
+            put(bytemuck::cast_slice(&contents.cones[..nc]));
+            put(bytemuck::cast_slice(&contents.shared.vertices[..header.vertices as usize]));
+            put(bytemuck::cast_slice(&contents.shared.normals[..header.normals as usize]));
+        }
+    }
     let mut left = header.materials as usize;
     for m in materials {
         let n = m.len().min(left);
@@ -305,7 +403,8 @@ pub enum CutError {
 }
 
 /// Cuts the tree of `nodes` over `items` into pages of at most `bytes_max` bytes: in preorder, each subtree either is a
-/// page, or lies above pages. `emit` gets both with their boxes; [`crate::top::TopNode`]s are made of them.
+/// page, or lies above pages. `emit` gets both with their boxes; [`crate::top::TopNode`]s are made of them. A page whose
+/// boxes cannot be held in steps is in full form, whatever `form` says.
 ///
 /// Bounded by the size of the tree times the page size over the least page. `forests` is scratch, one for each node.
 ///
@@ -319,6 +418,7 @@ pub fn pages<P: Primitives>(
     items: &[Item],
     source: &P,
     bytes_max: usize,
+    form: PageForm,
     forests: &mut [Forest],
     scratch: &mut Scratch,
     emit: &mut impl FnMut(&Aabb, Cut<'_>),
@@ -338,7 +438,7 @@ pub fn pages<P: Primitives>(
         if part.aabb.is_empty() {
             continue;
         }
-        if let Ok(bytes) = fill(&subject, &part, source, bytes_max, scratch) {
+        if let Ok(bytes) = fill(&subject, &part, source, bytes_max, form, scratch) {
             emit(&part.aabb, Cut::Page(&scratch.page[..lines_for(bytes)]));
             continue;
         }

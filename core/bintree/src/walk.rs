@@ -2,7 +2,10 @@
 
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Mask, Simd};
 use hybray_geometry::{Candidate, Ray, RayKernel, slab, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, DEPTH_MAX, Directory, Kind, NO_PARENT, Node, PageView, Pages, Row, Slot, WIDTH};
+use hybray_scene::{
+    BLOCK, Body, Child, DEPTH_MAX, Directory, Form, Kind, NO_PARENT, Node, PageView, Pages, Row, Slot, TriangleBlock,
+    WIDTH,
+};
 
 /// The directory, and the pages at hand: all of them unless `P` says otherwise.
 #[derive(Debug)]
@@ -255,7 +258,10 @@ impl<S: Simd> Walker<S> {
                         continue;
                     };
                     self.counts.pages += 1;
-                    self.page::<ANY>(page, &view, waiting, top);
+                    match &view.body {
+                        Body::Full(body) => self.page::<ANY>(page, &view, body, waiting, top),
+                        Body::Compact(body) => self.page::<ANY>(page, &view, body, waiting, top),
+                    }
                     if ANY && self.best.candidate.is_hit() {
                         return None;
                     }
@@ -306,18 +312,26 @@ impl<S: Simd> Walker<S> {
 
     /// Through one page, on the part of the stack above `base`.
     #[inline(always)]
-    fn page<const ANY: bool>(&mut self, number: u32, page: &PageView<'_>, waiting: &mut [Waiting; STACK], base: usize) {
+    fn page<'f, const ANY: bool>(
+        &mut self,
+        number: u32,
+        page: &PageView<'_>,
+        body: &impl Form<'f>,
+        waiting: &mut [Waiting; STACK],
+        base: usize,
+    ) {
+        let mut room = Node::EMPTY;
         let mut top = base;
         let mut child = Child::Inner(0).pack();
         loop {
             let kind = Child::unpack(child);
             if let Child::Inner(index) = kind {
-                if let Some(next) = self.step(&page.nodes[index as usize], waiting, &mut top) {
+                if let Some(next) = self.step(body.node(index as usize, &mut room), waiting, &mut top) {
                     child = next.child();
                     continue;
                 }
             } else if let Child::Leaf { kind, start, count } = kind {
-                self.leaf(number, page, kind, start as usize, count as usize);
+                self.leaf(number, page, body, kind, start as usize, count as usize);
                 if ANY && self.best.candidate.is_hit() {
                     return;
                 }
@@ -401,14 +415,16 @@ impl<S: Simd> Walker<S> {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, number: u32, page: &PageView<'_>, kind: Kind, start: usize, count: usize) {
+    fn leaf<'f>(&mut self, number: u32, page: &PageView<'_>, body: &impl Form<'f>, kind: Kind, start: usize, count: usize) {
         self.counts.blocks += count as u64;
         // A broadcast costs no more than a load of what was broadcast before.
         let lanes = self.kernel.splat(self.simd.splat4(0.0));
         match kind {
             Kind::Triangle => {
                 let [x, y, z] = lanes.axes;
-                for (i, block) in page.triangles[start..start + count].iter().enumerate() {
+                let mut room = TriangleBlock::EMPTY;
+                for i in 0..count {
+                    let block = body.triangles(start + i, &mut room);
                     let simd = self.simd;
                     let corner = |i: usize| [&block.v[i][x], &block.v[i][y], &block.v[i][z]];
                     let (a, b, c) = (corner(0), corner(1), corner(2));

@@ -3,11 +3,11 @@
 mod common;
 
 use common::scenes::{mixed, table};
-use common::{Rule, Shapes, build, cells, cut_tree, depth, rays, tree, verify};
+use common::{Rule, Shapes, build, cells, cut_tree_into, depth, rays, tree, verify};
 use hybray_bintree::walk::{Counts, Stack, nearest};
 use hybray_bintree::{BINARY_DEPTH_MAX, midpoint, sah};
 use hybray_geometry::simd::Kernels;
-use hybray_scene::BLOCK;
+use hybray_scene::{BLOCK, PageForm};
 
 fn presets() -> Vec<Rule> {
     let area = |leaf_max, node_cost| Rule::Sah(sah::Settings { leaf_max, node_cost, ..sah::Settings::default() });
@@ -76,9 +76,14 @@ fn presets_times_scenes() {
         assert!(hits > 0 || name.contains("denormals") || name.contains("points"), "{name}: the rays hit nothing");
         for rule in presets() {
             let tree = check_binary(name, &shapes, rule);
-            for page_bytes in [4096, 65_536] {
-                let built = cut_tree(&shapes, &tree, page_bytes).unwrap();
-                verify(&format!("{name} {rule:?} {page_bytes}"), &built, shapes.all.len(), &rays);
+            for (page_bytes, form) in [
+                (4096, PageForm::Full),
+                (65_536, PageForm::Full),
+                (4096, PageForm::Compact),
+                (65_536, PageForm::Compact),
+            ] {
+                let built = cut_tree_into(&shapes, &tree, page_bytes, form).unwrap();
+                verify(&format!("{name} {rule:?} {page_bytes} {form:?}"), &built, shapes.all.len(), &rays);
             }
         }
     }
@@ -139,7 +144,7 @@ fn trees_stay_compact() {
     assert!(slots < 1.6 && bytes < 100.0, "{census:?}");
     let views = built.views();
     let (mut nodes, mut children) = (0, 0);
-    for node in views.iter().flat_map(|page| page.nodes) {
+    for node in views.iter().flat_map(|page| page.body.nodes()) {
         nodes += 1;
         children += node.children().count();
     }

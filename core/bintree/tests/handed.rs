@@ -74,8 +74,9 @@ struct Tally {
 
 /// The primitives of a page.
 fn ids(page: &PageView<'_>) -> Vec<u32> {
-    let blocks = page.triangles.iter().map(|block| block.id).chain(page.spheres.iter().map(|block| block.id));
-    let mut ids: Vec<_> = blocks.flatten().chain(page.cones.iter().map(|cone| cone.id)).collect();
+    let triangles = (0..page.body.triangle_lanes()).map(|number| page.body.triangle_id(number));
+    let spheres = page.spheres.iter().flat_map(|block| block.id);
+    let mut ids: Vec<_> = triangles.chain(spheres).chain(page.cones.iter().map(|cone| cone.id)).collect();
     ids.sort_unstable();
     ids.dedup();
     ids

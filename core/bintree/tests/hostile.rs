@@ -3,7 +3,7 @@
 mod common;
 
 use common::scenes::mixed;
-use common::{Built, Random, Rule, Shapes, build};
+use common::{Built, Random, Rule, Shapes, build, build_compact};
 use hybray_bintree::check::{Coverage, check};
 use hybray_bintree::walk::{Counts, Resident, Stack, nearest, occluded};
 use hybray_bintree::{midpoint, sah};
@@ -18,6 +18,7 @@ fn originals() -> Vec<Built> {
         let shapes = Shapes { all: mixed(count, count as u64), materials, smooth };
         for rule in [Rule::Sah(sah::Settings::default()), Rule::Midpoint(midpoint::Settings::default(), 4)] {
             all.push(build(&shapes, rule, 4096).unwrap());
+            all.push(build_compact(&shapes, rule, 4096).unwrap());
         }
     }
     all
@@ -69,7 +70,7 @@ fn walk(scene: &Resident<'_>, ray: &Ray, kernels: Kernels, stack: &mut Stack) {
     if hit.candidate.is_hit() {
         let _ = scene.pages[hit.page as usize].material(hit.slot);
     }
-    let pages: usize = scene.pages.iter().map(|p| p.nodes.len()).sum();
+    let pages: usize = scene.pages.iter().map(|p| p.body.nodes().len()).sum();
     assert!(counts.nodes as usize <= scene.directory.nodes.len() + pages.max(1) * counts.pages as usize);
     let _ = occluded(kernels, scene, ray, stack, &mut Counts::default());
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Rule, Shape, Shapes, build, rays, verify};
+use common::{Rule, Shape, Shapes, build, build_compact, rays, verify};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::{Cone, Sphere, Triangle, Vec3};
 use proptest::prelude::*;
@@ -62,7 +62,9 @@ proptest! {
         }
         let count = all.len();
         let shapes = Shapes { all, materials: 2, smooth: true };
-        let built = build(&shapes, rule, page_bytes).unwrap();
-        verify("random", &built, count, &rays(&shapes, 24, seed));
+        let rays = rays(&shapes, 24, seed);
+        for built in [build(&shapes, rule, page_bytes).unwrap(), build_compact(&shapes, rule, page_bytes).unwrap()] {
+            verify("random", &built, count, &rays);
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::wide::{DIRECTORY, Entry, List};
 use hybray_bintree::walk::{Counts, Hit, Resident, STACK};
 use hybray_geometry::simd::{Lanes, Mask, Simd};
 use hybray_geometry::{Aabb, Candidate, LaneRay, Ray, RayKernel, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, Kind, Node, PageView, Pages, Slot, WIDTH};
+use hybray_scene::{BLOCK, Child, Form, Kind, Node, PageView, Pages, Slot, TriangleBlock, WIDTH};
 
 /// Lanes of a packet at most.
 pub(crate) const LANES_MAX: usize = 16;
@@ -111,6 +111,8 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
         waiting: &mut [Waiting; STACK],
     ) {
         let (mut node, mut slot, mut page) = (node, slot, page);
+        // Where nodes of compact pages are put: the one in work, and the one that is opened.
+        let (mut room, mut below_room) = (Node::EMPTY, Node::EMPTY);
         // The page in work: its nodes are done with before those of another.
         let mut view = at_hand(scene, page);
         let mut top = 0;
@@ -122,9 +124,12 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
             if met != 0 {
                 match (Child::unpack(node.child[slot]), &view) {
                     (Child::Inner(index), _) if page == DIRECTORY => {
-                        top = self.open(scene.directory.nodes, index, page, waiting, top);
+                        top = self.open(&scene.directory.nodes[index as usize], index, page, waiting, top);
                     }
-                    (Child::Inner(index), Some(view)) => top = self.open(view.nodes, index, page, waiting, top),
+                    (Child::Inner(index), Some(view)) => {
+                        let node = view.body.node(index as usize, &mut below_room);
+                        top = self.open(node, index, page, waiting, top);
+                    }
                     (Child::Leaf { kind, start, count }, Some(view)) => {
                         let place = (page, kind, start as usize, count as usize);
                         if self.leaf(view, place, met) {
@@ -135,7 +140,7 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
                     (Child::Page(below), _) => {
                         if let Some(found) = scene.pages.page(below) {
                             self.counts.pages += 1;
-                            top = self.open(found.nodes, 0, below, waiting, top);
+                            top = self.open(found.body.node(0, &mut below_room), 0, below, waiting, top);
                             (page, view) = (below, Some(found));
                         } else {
                             self.miss(below, met, near);
@@ -158,16 +163,18 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
             if of != page {
                 (page, view) = (of, at_hand(scene, of));
             }
-            let nodes = view.as_ref().map_or(scene.directory.nodes, |view| view.nodes);
-            (node, slot) = (&nodes[at / WIDTH], at % WIDTH);
+            slot = at % WIDTH;
+            node = match &view {
+                Some(view) => view.body.node(at / WIDTH, &mut room),
+                None => &scene.directory.nodes[at / WIDTH],
+            };
         }
     }
 
     /// Puts the children of a node that the packet may meet on the stack, the nearest last; returns the new top.
     #[inline(always)]
-    fn open(&mut self, nodes: &[Node], index: u32, page: u32, waiting: &mut [Waiting; STACK], top: usize) -> usize {
+    fn open(&mut self, node: &Node, index: u32, page: u32, waiting: &mut [Waiting; STACK], top: usize) -> usize {
         self.counts.nodes += 1;
-        let node = &nodes[index as usize];
         let (mut met, near) = self.span.meets(self.simd, &node.lo, &node.hi, self.stop);
         let mut end = top;
         while met != 0 {
@@ -236,7 +243,9 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
         let lanes = self.lanes;
         if kind == Kind::Triangle {
             let [x, y, z] = lanes.axes;
-            for (i, block) in view.triangles[start..start + count].iter().enumerate() {
+            let mut room = TriangleBlock::EMPTY;
+            for i in 0..count {
+                let block = view.body.triangles(start + i, &mut room);
                 for lane in 0..BLOCK {
                     if lane > 0 && block.id[lane] == block.id[lane - 1] {
                         break;
@@ -293,9 +302,10 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
         let [x, y, z] = ray.axes;
         let mut best = self.best[lane];
         let mut changed = false;
+        let mut room = TriangleBlock::EMPTY;
         for block in start..start + count {
             let (t, hit, ids) = if kind == Kind::Triangle {
-                let block = &view.triangles[block];
+                let block = view.body.triangles(block, &mut room);
                 let row = |i: usize| [&block.v[i][x], &block.v[i][y], &block.v[i][z]];
                 let (a, b, c) = (row(0), row(1), row(2));
                 let v = [

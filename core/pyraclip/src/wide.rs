@@ -11,7 +11,7 @@ use crate::span::Span;
 use hybray_bintree::walk::{Counts, Resident, STACK, Stack, Walk, Walked};
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Simd};
 use hybray_geometry::{Aabb, Bundle, Ray};
-use hybray_scene::{Child, Directory, Node, Pages, WIDTH};
+use hybray_scene::{Child, Directory, Form, Node, Pages, WIDTH};
 
 /// Rays of a bundle at most.
 pub const RAYS_MAX: usize = 256;
@@ -294,6 +294,7 @@ pub(crate) fn clip<const ANY: bool, S: Simd, P: Pages + ?Sized>(
     // What meets nearly everything is not worth a list. Level by level, so that what is left unopened is as far down everywhere.
     let is_list = span.narrow && most > 1;
     let mut is_open = is_list;
+    let mut room = Node::EMPTY;
     'levels: while is_open {
         is_open = false;
         // What takes the place of an opened entry has had its turn, or is of the next level.
@@ -304,12 +305,13 @@ pub(crate) fn clip<const ANY: bool, S: Simd, P: Pages + ?Sized>(
                     Some((&scene.directory.nodes[index as usize], DIRECTORY))
                 }
                 Child::Inner(index) => {
-                    scene.pages.page(entry.page).map(|page| (&page.nodes[index as usize], entry.page))
+                    let view = scene.pages.page(entry.page);
+                    view.map(|view| (view.body.node(index as usize, &mut room), entry.page))
                 }
                 Child::Page(page) => {
                     let view = scene.pages.page(page);
                     counts.pages += u64::from(view.is_some());
-                    view.map(|view| (&view.nodes[0], page))
+                    view.map(|view| (view.body.node(0, &mut room), page))
                 }
                 Child::Leaf { .. } | Child::Unused => None,
             };

@@ -117,7 +117,7 @@ impl<'a> Directory<'a> {
         };
         led_to.fill(0);
         let mut twice = None;
-        check_nodes(nodes, level, |child| match child {
+        check_nodes(nodes.iter().map(|node| node.child), level, |child| match child {
             Child::Page(page) => {
                 let times = led_to.get_mut(page as usize).ok_or("a page that is not in the directory")?;
                 if core::mem::replace(times, 1) != 0 {

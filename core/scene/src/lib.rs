@@ -10,11 +10,13 @@
 compile_error!("pages are little-endian blocks that are read in place");
 
 mod directory;
+mod form;
 mod node;
 mod page;
 mod primitives;
 
 pub use directory::{Directory, DirectoryError, NO_PARENT, PageEntry, Pages, parents};
+pub use form::{Body, Compact, CompactNode, CompactTriangles, Form, Full, PageForm};
 pub use node::{Child, Node, Row, WIDTH};
 pub use page::{HEADER_BYTES, Header, Line, PAGE_BYTES_MAX, PageError, PageView, Tables, lines_for};
 pub use primitives::{BLOCK, ConeRecord, Kind, Slot, SphereBlock, TriangleBlock};

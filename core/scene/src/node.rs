@@ -59,10 +59,10 @@ pub enum Child {
     Unused,
 }
 
-const TAG_LEAF: u32 = 1 << 30;
+pub(crate) const TAG_LEAF: u32 = 1 << 30;
 const TAG_PAGE: u32 = 2 << 30;
-const TAG_UNUSED: u32 = 3 << 30;
-const START_BITS: u32 = 24;
+pub(crate) const TAG_UNUSED: u32 = 3 << 30;
+pub(crate) const START_BITS: u32 = 24;
 
 impl Child {
     /// Inner nodes and pages are numbered below this.

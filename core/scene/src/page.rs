@@ -1,6 +1,9 @@
 //! A page: header, nodes, primitives, and what shading needs of them.
 
-use crate::{BLOCK, Child, ConeRecord, DEPTH_MAX, Kind, Node, Slot, SphereBlock, TriangleBlock};
+use crate::{
+    BLOCK, Body, Child, Compact, CompactNode, CompactTriangles, ConeRecord, DEPTH_MAX, Full, Kind, Node, PageForm,
+    Slot, SphereBlock, TriangleBlock, WIDTH,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// Most bytes of a page.
@@ -19,23 +22,24 @@ pub const fn lines_for(bytes: usize) -> usize {
     bytes.div_ceil(64)
 }
 
-/// First 64 bytes of a page. The arrays follow in the order of the counts, without gaps.
+/// First 64 bytes of a page. The arrays follow without gaps: in the full form nodes, triangles, spheres, cones, normals,
+/// materials; in the compact one nodes, spheres, triangles, cones, vertices, normals, materials.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
-    /// [`Header::MAGIC`].
+    /// [`Header::MAGIC`], or [`Header::MAGIC_COMPACT`].
     pub magic: u32,
     /// Bytes of the whole page, this header included.
     pub bytes: u32,
-    /// [`Node`]s; the first is the root.
+    /// [`Node`]s, or [`CompactNode`]s; the first is the root.
     pub nodes: u32,
-    /// [`TriangleBlock`]s.
+    /// [`TriangleBlock`]s, or [`CompactTriangles`].
     pub triangle_blocks: u32,
     /// [`SphereBlock`]s.
     pub sphere_blocks: u32,
     /// [`ConeRecord`]s.
     pub cones: u32,
-    /// Vertex normals: three packed ones for each triangle lane, or none at all.
+    /// Vertex normals: three packed ones for each triangle lane, or one for each vertex of a compact page, or none at all.
     pub normals: u32,
     /// Materials: a `u16` for each lane and cone in slot order, or one for all.
     pub materials: u32,
@@ -43,25 +47,41 @@ pub struct Header {
     pub lo: [f32; 3],
     /// Greatest corner.
     pub hi: [f32; 3],
+    /// Vertices of a compact page.
+    pub vertices: u32,
     /// Zero.
-    pub reserved: [u32; 2],
+    pub reserved: u32,
 }
 
 const _: () = assert!(core::mem::size_of::<Header>() == 64);
 
 impl Header {
-    /// "hyP" and the version of the format.
+    /// "hyP" and the version of the format: a page in full form.
     pub const MAGIC: u32 = u32::from_le_bytes(*b"hyP\x01");
+    /// "hyC" and the version of the format: a compact page.
+    pub const MAGIC_COMPACT: u32 = u32::from_le_bytes(*b"hyC\x01");
+
+    /// The form that the magic tells.
+    #[must_use]
+    #[inline(always)]
+    pub const fn form(&self) -> PageForm {
+        if self.magic == Self::MAGIC_COMPACT { PageForm::Compact } else { PageForm::Full }
+    }
 
     /// Bytes of a page with these counts.
     #[must_use]
     pub const fn bytes_for(&self) -> u64 {
+        let (node, triangles, normal, vertices) = match self.form() {
+            PageForm::Full => (size_of::<Node>(), size_of::<TriangleBlock>(), 12, 0),
+            PageForm::Compact => (size_of::<CompactNode>(), size_of::<CompactTriangles>(), 4, self.vertices as u64),
+        };
         HEADER_BYTES as u64
-            + self.nodes as u64 * size_of::<Node>() as u64
-            + self.triangle_blocks as u64 * size_of::<TriangleBlock>() as u64
+            + self.nodes as u64 * node as u64
+            + self.triangle_blocks as u64 * triangles as u64
             + self.sphere_blocks as u64 * size_of::<SphereBlock>() as u64
             + self.cones as u64 * size_of::<ConeRecord>() as u64
-            + self.normals as u64 * 12
+            + vertices * 12
+            + self.normals as u64 * normal
             + self.materials as u64 * 2
     }
 
@@ -104,6 +124,12 @@ pub enum PageError {
         /// What is wrong with it.
         what: &'static str,
     },
+    /// A triangle of a compact page that has a vertex beyond the last one.
+    #[error("block {block} of a page's triangles is broken: a vertex beyond the last one")]
+    Vertex {
+        /// Its index.
+        block: usize,
+    },
     /// A material beyond the scene's table.
     #[error("a page refers to material {0}, which the scene does not have")]
     Material(u16),
@@ -114,16 +140,12 @@ pub enum PageError {
 pub struct PageView<'a> {
     /// Its header.
     pub header: &'a Header,
-    /// The root first; children after their parents.
-    pub nodes: &'a [Node],
-    /// Triangles.
-    pub triangles: &'a [TriangleBlock],
+    /// Nodes and triangles.
+    pub body: Body<'a>,
     /// Spheres.
     pub spheres: &'a [SphereBlock],
     /// Cones.
     pub cones: &'a [ConeRecord],
-    /// Packed vertex normals of each triangle lane; or empty.
-    pub normals: &'a [[u32; 3]],
     /// One for all, or one for each slot.
     pub materials: &'a [u16],
 }
@@ -140,7 +162,7 @@ impl<'a> PageView<'a> {
             return Err(short(HEADER_BYTES as u64));
         }
         let header: &Header = bytemuck::from_bytes(&all[..HEADER_BYTES]);
-        if header.magic != Header::MAGIC {
+        if header.magic != Header::MAGIC && header.magic != Header::MAGIC_COMPACT {
             return Err(PageError::Magic(header.magic));
         }
         let counts = [
@@ -150,6 +172,7 @@ impl<'a> PageView<'a> {
             header.cones,
             header.normals,
             header.materials,
+            header.vertices,
         ];
         if counts.iter().any(|&n| n as usize > PAGE_BYTES_MAX) {
             return Err(PageError::Header("more of something than a page can hold"));
@@ -167,15 +190,22 @@ impl<'a> PageView<'a> {
         if header.materials != 1 && header.materials != header.material_slots() {
             return Err(PageError::Header("neither one material nor one for each slot"));
         }
-        if header.normals != 0 && header.normals != header.triangle_blocks * BLOCK as u32 {
-            return Err(PageError::Header("neither no normals nor three for each triangle"));
+        let (smooth, what) = match header.form() {
+            PageForm::Full if header.vertices != 0 => {
+                return Err(PageError::Header("vertices that triangles do not share"));
+            }
+            PageForm::Full => (header.triangle_blocks * BLOCK as u32, "neither no normals nor three for each triangle"),
+            PageForm::Compact => (header.vertices, "neither no normals nor one for each vertex"),
+        };
+        if header.normals != 0 && header.normals != smooth {
+            return Err(PageError::Header(what));
         }
 
         let view = Self::of_valid(lines);
-        check_nodes(view.nodes, &mut [0; PAGE_BYTES_MAX / size_of::<Node>()], |child| match child {
+        let leaf = |child| match child {
             Child::Leaf { kind, start, count } => {
                 let have = match kind {
-                    Kind::Triangle => view.triangles.len(),
+                    Kind::Triangle => header.triangle_blocks as usize,
                     Kind::Sphere => view.spheres.len(),
                     Kind::Cone => view.cones.len(),
                 };
@@ -183,8 +213,21 @@ impl<'a> PageView<'a> {
             }
             Child::Page(_) => Err("a page inside a page"),
             Child::Inner(_) | Child::Unused => Ok(()),
-        })
+        };
+        let level = &mut [0; PAGE_BYTES_MAX / size_of::<CompactNode>()];
+        match &view.body {
+            Body::Full(page) => check_nodes(page.nodes.iter().map(|node| node.child), level, leaf),
+            Body::Compact(page) => check_nodes(page.nodes.iter().map(CompactNode::packed_children), level, leaf),
+        }
         .map_err(|(node, what)| PageError::Node { node, what })?;
+        if let Body::Compact(page) = &view.body {
+            let beyond = |block: &CompactTriangles| {
+                block.v.as_flattened().iter().any(|&vertex| usize::from(vertex) >= page.vertices.len())
+            };
+            if let Some(block) = page.triangles.iter().position(beyond) {
+                return Err(PageError::Vertex { block });
+            }
+        }
         if let Some(&material) = view.materials.iter().find(|&&m| usize::from(m) >= tables.materials) {
             return Err(PageError::Material(material));
         }
@@ -200,21 +243,46 @@ impl<'a> PageView<'a> {
     pub fn of_valid(lines: &'a [Line]) -> Self {
         let all: &[u8] = bytemuck::cast_slice(lines);
         let header: &Header = bytemuck::from_bytes(&all[..HEADER_BYTES]);
-        let (_, rest) = all.split_at(HEADER_BYTES);
-        let (nodes, rest) = rest.split_at(header.nodes as usize * size_of::<Node>());
-        let (triangles, rest) = rest.split_at(header.triangle_blocks as usize * size_of::<TriangleBlock>());
-        let (spheres, rest) = rest.split_at(header.sphere_blocks as usize * size_of::<SphereBlock>());
-        let (cones, rest) = rest.split_at(header.cones as usize * size_of::<ConeRecord>());
-        let (normals, rest) = rest.split_at(header.normals as usize * 12);
-        let (materials, _) = rest.split_at(header.materials as usize * 2);
+        let mut rest = &all[HEADER_BYTES..];
+        let mut take = |count: u32, each: usize| {
+            let (these, others) = rest.split_at(count as usize * each);
+            rest = others;
+            these
+        };
+        let (sphere_bytes, cone_bytes) = (size_of::<SphereBlock>(), size_of::<ConeRecord>());
+        let (body, spheres, cones) = match header.form() {
+            PageForm::Full => {
+                let nodes = take(header.nodes, size_of::<Node>());
+                let triangles = take(header.triangle_blocks, size_of::<TriangleBlock>());
+                let (spheres, cones) = (take(header.sphere_blocks, sphere_bytes), take(header.cones, cone_bytes));
+                let full = Full {
+                    nodes: bytemuck::cast_slice(nodes),
+                    triangles: bytemuck::cast_slice(triangles),
+                    normals: bytemuck::cast_slice(take(header.normals, 12)),
+                };
+                (Body::Full(full), spheres, cones)
+            }
+            PageForm::Compact => {
+                let nodes = take(header.nodes, size_of::<CompactNode>());
+                // What is aligned to sixteen bytes comes first.
+                let spheres = take(header.sphere_blocks, sphere_bytes);
+                let triangles = take(header.triangle_blocks, size_of::<CompactTriangles>());
+                let cones = take(header.cones, cone_bytes);
+                let compact = Compact {
+                    nodes: bytemuck::cast_slice(nodes),
+                    triangles: bytemuck::cast_slice(triangles),
+                    vertices: bytemuck::cast_slice(take(header.vertices, 12)),
+                    normals: bytemuck::cast_slice(take(header.normals, 4)),
+                };
+                (Body::Compact(compact), spheres, cones)
+            }
+        };
         Self {
             header,
-            nodes: bytemuck::cast_slice(nodes),
-            triangles: bytemuck::cast_slice(triangles),
+            body,
             spheres: bytemuck::cast_slice(spheres),
             cones: bytemuck::cast_slice(cones),
-            normals: bytemuck::cast_slice(normals),
-            materials: bytemuck::cast_slice(materials),
+            materials: bytemuck::cast_slice(take(header.materials, 2)),
         }
     }
 
@@ -226,26 +294,27 @@ impl<'a> PageView<'a> {
         }
         let before = match slot.kind() {
             Kind::Triangle => 0,
-            Kind::Sphere => self.triangles.len() * BLOCK,
-            Kind::Cone => (self.triangles.len() + self.spheres.len()) * BLOCK,
+            Kind::Sphere => self.body.triangle_lanes(),
+            Kind::Cone => self.body.triangle_lanes() + self.spheres.len() * BLOCK,
         };
         self.materials[before + slot.number()]
     }
 }
 
 /// Checks that children come after their parents, that each has one parent, that none is below [`DEPTH_MAX`], and
-/// `leaf` of what is no inner node. `level` is scratch, one byte a node.
+/// `leaf` of what is no inner node. `nodes` are their packed children; `level` is scratch, one byte a node.
 pub(crate) fn check_nodes(
-    nodes: &[Node],
+    nodes: impl ExactSizeIterator<Item = [u32; WIDTH]>,
     level: &mut [u8],
     mut leaf: impl FnMut(Child) -> Result<(), &'static str>,
 ) -> Result<(), (usize, &'static str)> {
-    let Some(level) = level.get_mut(..nodes.len()) else {
+    let count = nodes.len();
+    let Some(level) = level.get_mut(..count) else {
         return Err((level.len(), "more nodes than there is scratch for"));
     };
     level.fill(0);
-    for (index, node) in nodes.iter().enumerate() {
-        for packed in node.child {
+    for (index, children) in nodes.enumerate() {
+        for packed in children {
             let child = Child::unpack(packed);
             if packed != child.pack() {
                 return Err((index, "an unknown kind of child"));
@@ -253,7 +322,7 @@ pub(crate) fn check_nodes(
             match child {
                 Child::Inner(next) => {
                     let next = next as usize;
-                    if next <= index || next >= nodes.len() {
+                    if next <= index || next >= count {
                         return Err((index, "a child that does not come after it"));
                     }
                     if level[next] != 0 {

@@ -62,6 +62,9 @@ const _: () = assert!(core::mem::size_of::<SphereBlock>() == 80);
 const _: () = assert!(core::mem::size_of::<ConeRecord>() == 36);
 
 impl TriangleBlock {
+    /// What is there before triangles are.
+    pub const EMPTY: Self = Self { v: [[[0.0; BLOCK]; 3]; 3], id: [0; BLOCK] };
+
     /// The triangle in `lane`.
     #[must_use]
     #[inline(always)]

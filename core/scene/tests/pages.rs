@@ -4,7 +4,7 @@ mod common;
 
 use common::{Parts, branch, chain, leaf, parse, sample};
 use hybray_scene::{
-    Child, HEADER_BYTES, Kind, Line, Node, PAGE_BYTES_MAX, PageError, PageView, Slot, Tables, lines_for,
+    Body, Child, HEADER_BYTES, Kind, Line, Node, PAGE_BYTES_MAX, PageError, PageView, Slot, Tables, lines_for,
 };
 
 /// Parses `parts` after `change` has been at its lines.
@@ -38,16 +38,17 @@ fn a_page_is_read_where_it_lies() {
     let parts = sample();
     let lines = parts.lines();
     let page = parse(&lines).unwrap();
+    let Body::Full(body) = page.body else { panic!("{:?}", page.body.form()) };
     assert_eq!(
-        (page.nodes, page.triangles, page.spheres),
+        (body.nodes, body.triangles, page.spheres),
         (&parts.nodes[..], &parts.triangles[..], &parts.spheres[..])
     );
     assert_eq!(
-        (page.cones, page.normals, page.materials),
+        (page.cones, body.normals, page.materials),
         (&parts.cones[..], &parts.normals[..], &parts.materials[..])
     );
     assert_eq!(page.header.bytes as usize, HEADER_BYTES + 224 + 2 * 160 + 80 + 3 * 36 + 8 * 12 + 15 * 2);
-    assert_eq!(page.nodes.as_ptr().cast::<u8>(), lines[1].0.as_ptr(), "in place");
+    assert_eq!(body.nodes.as_ptr().cast::<u8>(), lines[1].0.as_ptr(), "in place");
 }
 
 #[test]

@@ -127,10 +127,9 @@ impl HitRecord {
 pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint {
     let kernel = RayKernel::new(ray);
     let (t, slot) = (hit.candidate.t, hit.slot);
-    let (block, lane) = (slot.number() / BLOCK, slot.number() % BLOCK);
     match slot.kind() {
-        Kind::Triangle => page.triangles[block].get(lane).surface(&kernel, t),
-        Kind::Sphere => page.spheres[block].get(lane).surface(&kernel, t),
+        Kind::Triangle => page.body.triangle(slot.number()).surface(&kernel, t),
+        Kind::Sphere => page.spheres[slot.number() / BLOCK].get(slot.number() % BLOCK).surface(&kernel, t),
         Kind::Cone => page.cones[slot.number()].get().surface(&kernel, t),
     }
 }
@@ -142,7 +141,7 @@ pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint 
 #[must_use]
 pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surface> {
     let held = match hit.slot.kind() {
-        Kind::Triangle => page.triangles.len() * BLOCK,
+        Kind::Triangle => page.body.triangle_lanes(),
         Kind::Sphere => page.spheres.len() * BLOCK,
         Kind::Cone => page.cones.len(),
     };
@@ -162,8 +161,7 @@ pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surfac
     };
     Some(match vertex_normals(page, hit.slot) {
         Some(packed) => {
-            let number = hit.slot.number();
-            let corners = page.triangles[number / BLOCK].get(number % BLOCK).v;
+            let corners = page.body.triangle(hit.slot.number()).v;
             let [u, v] = point.uv;
             flat.smooth(corners, packed.map(unpack_normal), [1.0 - u - v, u, v])
         }
@@ -172,6 +170,8 @@ pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surfac
 }
 
 fn vertex_normals(page: &PageView<'_>, slot: Slot) -> Option<[u32; 3]> {
-    let triangle = slot.kind() == Kind::Triangle;
-    page.normals.get(slot.number()).filter(|_| triangle).copied().filter(|packed| !packed.contains(&FLAT))
+    if slot.kind() != Kind::Triangle {
+        return None;
+    }
+    page.body.normals(slot.number()).filter(|packed| !packed.contains(&FLAT))
 }

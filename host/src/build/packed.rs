@@ -67,7 +67,7 @@ pub(crate) fn hash_page(lines: &[Line]) -> u64 {
 
 /// Different primitives in a page: one may stand in several leaves, and lanes are filled up by repetition.
 pub(crate) fn primitives_in(page: &PageView<'_>) -> u32 {
-    let triangles = page.triangles.iter().flat_map(|block| block.id);
+    let triangles = (0..page.body.triangle_lanes()).map(|number| page.body.triangle_id(number));
     let spheres = page.spheres.iter().flat_map(|block| block.id);
     let mut ids: Vec<u32> = triangles.chain(spheres).chain(page.cones.iter().map(|cone| cone.id)).collect();
     ids.sort_unstable();
@@ -233,11 +233,10 @@ impl<'a> Pages<'a> {
                     sum = sum.wrapping_add(parts.into_iter().fold(HASH_START, hash_bytes));
                 }
             };
-            for number in 0..page.triangles.len() * BLOCK {
-                let (block, lane) = (&page.triangles[number / BLOCK], number % BLOCK);
-                let corners = block.get(lane).v.map(|v| v.to_array());
-                let normals = page.normals.get(number).unwrap_or(&[FLAT; 3]);
-                add(Kind::Triangle, number, block.id[lane], corners.as_flattened(), normals);
+            for number in 0..page.body.triangle_lanes() {
+                let corners = page.body.triangle(number).v.map(|v| v.to_array());
+                let normals = page.body.normals(number).unwrap_or([FLAT; 3]);
+                add(Kind::Triangle, number, page.body.triangle_id(number), corners.as_flattened(), &normals);
             }
             for number in 0..page.spheres.len() * BLOCK {
                 let (block, lane) = (&page.spheres[number / BLOCK], number % BLOCK);

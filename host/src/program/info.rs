@@ -12,7 +12,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
     let (prepared, import_time) = prepare(&args.scene, &args.tree, None, PAGE_BYTES_MAX as u32)?;
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
-    let nodes = scene.resident.pages.iter().map(|p| p.nodes.len()).sum::<usize>();
+    let nodes = scene.resident.pages.iter().map(|p| p.body.nodes().len()).sum::<usize>();
     let out = &mut std::io::stdout().lock();
     let o = &prepared.objects;
     let [triangles, spheres, cones] = prepared.primitives;

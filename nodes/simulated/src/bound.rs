@@ -7,7 +7,7 @@
 use crate::machine::{Costs, Machine};
 use crate::take::FRAMES;
 use hybray_link::Peer;
-use hybray_scene::DEPTH_MAX as LEVELS_MAX;
+use hybray_scene::{BLOCK, DEPTH_MAX as LEVELS_MAX};
 use hybray_scheduler::{BUNDLE, DEPTH_MAX, FETCHES, PART_BYTES, Plan, REQUESTS_MAX, Settings};
 use hybray_tracer::{SHADOW_CHAIN_MAX, Scene, TOGETHER};
 use hybray_wire::{BODY_BYTES_MAX, Frame, HEAD_BYTES_MAX, Partial, RayRecord, TILE, TileMap};
@@ -148,8 +148,9 @@ impl Walks {
     fn of(scene: &Scene<'_>, costs: &Costs) -> Self {
         let (directory, pages) = (&scene.resident.directory, scene.resident.pages);
         let directory_nodes = directory.nodes.len();
-        let cells = directory_nodes + pages.iter().map(|page| page.nodes.len()).sum::<usize>();
-        let blocks: usize = pages.iter().map(|p| p.triangles.len() + p.spheres.len() + p.cones.len()).sum();
+        let cells = directory_nodes + pages.iter().map(|page| page.body.nodes().len()).sum::<usize>();
+        let blocks: usize =
+            pages.iter().map(|p| p.body.triangle_lanes() / BLOCK + p.spheres.len() + p.cones.len()).sum();
         let times = |cost: u64, count: usize| u128::from(cost) * count as u128;
         let walk_ps = times(costs.cell, cells) + times(costs.block, blocks) + times(costs.page, pages.len());
         let chain = if scene.transmits { u128::from(SHADOW_CHAIN_MAX) + 1 } else { 1 };

@@ -10,7 +10,7 @@ use hybray_bintree::walk::{Counts, Resident, Stack, nearest, occluded};
 use hybray_bintree::{BinaryNode, Forest, Item, midpoint, sah, top};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Aabb, Candidate, Cone, Ray, RayKernel, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Header, Kind, Line, Node, PageEntry, PageView, Tables};
+use hybray_scene::{Directory, Header, Kind, Line, Node, PageEntry, PageForm, PageView, Tables};
 
 /// Numbers that depend on nothing but the seed.
 pub struct Random(pub u64);
@@ -187,19 +187,25 @@ pub struct Built {
 }
 
 pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built, CutError> {
+    cut_tree_into(shapes, tree, page_bytes, PageForm::Full)
+}
+
+pub fn cut_tree_into(shapes: &Shapes, tree: &Tree, page_bytes: usize, form: PageForm) -> Result<Built, CutError> {
     let mut scratch = Box::<cut::Scratch>::default();
     let mut above = top::Builder::new();
     let (mut pages, mut entries) = (Vec::new(), Vec::new());
     let mut forests = vec![Forest::EMPTY; tree.nodes.len()];
-    cut::pages(&tree.nodes, &tree.items, shapes, page_bytes, &mut forests, &mut scratch, &mut |aabb, cut| match cut {
-        Cut::Above => above.above(aabb),
-        Cut::Page(lines) => {
-            above.page(aabb, pages.len() as u32);
-            let header: &Header = bytemuck::from_bytes(&lines[0].0);
-            let bytes: &[u8] = bytemuck::cast_slice(lines);
-            assert!(bytes[header.bytes as usize..].iter().all(|&b| b == 0), "padded with zeros");
-            entries.push(PageEntry { bytes: header.bytes, owner: 0, kind: 0 });
-            pages.push(lines.to_vec());
+    cut::pages(&tree.nodes, &tree.items, shapes, page_bytes, form, &mut forests, &mut scratch, &mut |aabb, cut| {
+        match cut {
+            Cut::Above => above.above(aabb),
+            Cut::Page(lines) => {
+                above.page(aabb, pages.len() as u32);
+                let header: &Header = bytemuck::from_bytes(&lines[0].0);
+                let bytes: &[u8] = bytemuck::cast_slice(lines);
+                assert!(bytes[header.bytes as usize..].iter().all(|&b| b == 0), "padded with zeros");
+                entries.push(PageEntry { bytes: header.bytes, owner: 0, kind: 0 });
+                pages.push(lines.to_vec());
+            }
         }
     })?;
     let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
@@ -212,6 +218,11 @@ pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built
 
 pub fn build(shapes: &Shapes, rule: Rule, page_bytes: usize) -> Result<Built, CutError> {
     cut_tree(shapes, &tree(shapes, rule), page_bytes)
+}
+
+/// The same in compact pages.
+pub fn build_compact(shapes: &Shapes, rule: Rule, page_bytes: usize) -> Result<Built, CutError> {
+    cut_tree_into(shapes, &tree(shapes, rule), page_bytes, PageForm::Compact)
 }
 
 impl Built {

@@ -2,7 +2,7 @@
 
 use hybray_bintree::{BinaryNode, Forest, Item, cut, sah, top};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageView, Tables};
+use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageForm, PageView, Tables};
 use hybray_shading::{Highlight, Light, LightKind, Material, spawn};
 use hybray_tracer::Scene;
 use hybray_wire::Frame;
@@ -73,12 +73,21 @@ impl Toy {
         let used = sah::build(&mut items, &mut tree, &sah::Settings::default());
         let (mut page, mut aabb) = (Vec::new(), Aabb::EMPTY);
         let mut forests = vec![Forest::EMPTY; used];
-        cut::pages(&tree[..used], &items, &spheres, 4096, &mut forests, &mut Box::default(), &mut |around, cut| {
-            if let cut::Cut::Page(lines) = cut {
-                aabb = *around;
-                page.extend_from_slice(lines);
-            }
-        })
+        cut::pages(
+            &tree[..used],
+            &items,
+            &spheres,
+            4096,
+            PageForm::Full,
+            &mut forests,
+            &mut Box::default(),
+            &mut |around, cut| {
+                if let cut::Cut::Page(lines) = cut {
+                    aabb = *around;
+                    page.extend_from_slice(lines);
+                }
+            },
+        )
         .expect("ten spheres fit a page");
         let mut nodes = vec![Node::EMPTY; top::nodes_for(1)];
         let used =
