@@ -6,6 +6,7 @@ use hybray::model;
 use hybray::partition::light_caches;
 use hybray::prepare::Prepared;
 use hybray_native::{Budget, DispatcherAt, Farm, plan, trace, trace_within};
+use hybray_scene::PageForm;
 use hybray_scheduler::policy::{Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings, Sizes};
 use hybray_tests::{Random, kernels, scene, within};
@@ -17,8 +18,8 @@ const LINE: u64 = 64;
 
 /// Draws a scene on farms with every policy, and with the least memory that will do and half as much again. Returns how many
 /// pages were in light caches.
-fn check(name: &str, page_bytes: usize, samples: u32) -> usize {
-    let prepared = Prepared::new(scene(name), &build::Settings { page_bytes, ..build::Settings::default() })
+fn check(name: &str, page_bytes: usize, pages: PageForm, samples: u32) -> usize {
+    let prepared = Prepared::new(scene(name), &build::Settings { page_bytes, pages, ..build::Settings::default() })
         .unwrap_or_else(|e| panic!("{name}: {e}"));
     let opened = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
     let scene = prepared.scene(&opened);
@@ -122,32 +123,34 @@ fn needed(plan: Result<Plan, PlanError>) -> Option<u64> {
 
 #[test]
 fn balls() {
-    check("spd:balls:2", 4096, 2);
-    check("spd:balls:2", 16_384, 1);
+    check("spd:balls:2", 4096, PageForm::Full, 2);
+    check("spd:balls:2", 16_384, PageForm::Full, 1);
 }
 
 #[test]
 fn glass() {
-    let light_pages = check("spd:teapot:3", 4096, 1) + check("spd:teapot:3", 16_384, 1);
+    let light_pages =
+        check("spd:teapot:3", 4096, PageForm::Full, 1) + check("spd:teapot:3", 16_384, PageForm::Compact, 1);
     assert!(light_pages > 100, "{light_pages} pages in light caches");
 }
 
 #[test]
 fn mirrors() {
-    check("cornell:mirror", 4096, 2);
-    check("cornell:mirror", 16_384, 1);
+    check("cornell:mirror", 4096, PageForm::Full, 2);
+    check("cornell:mirror", 16_384, PageForm::Compact, 1);
 }
 
 #[test]
 fn meshes_without_end() {
-    let light_pages = check("organic:2000", 4096, 1) + check("organic:2000", 16_384, 1);
+    let light_pages =
+        check("organic:2000", 4096, PageForm::Full, 1) + check("organic:2000", 16_384, PageForm::Compact, 1);
     assert!(light_pages > 100, "{light_pages} pages in light caches");
 }
 
 #[test]
 fn many_lights() {
-    check("paper:vase", 4096, 1);
-    check("paper:vase", 16_384, 1);
+    check("paper:vase", 4096, PageForm::Full, 1);
+    check("paper:vase", 16_384, PageForm::Full, 1);
 }
 
 /// Even shares, for scenes and budgets of all sizes: what is refused says what would do, and no less would.

@@ -7,6 +7,7 @@ use hybray::partition::Voxels;
 use hybray::prepare::Prepared;
 use hybray_bintree::midpoint;
 use hybray_native::{DispatcherAt, Farm};
+use hybray_scene::PageForm;
 use hybray_scheduler::Options;
 use hybray_tests::{Random, drawn, kernels, scene};
 use std::fs::{self, File};
@@ -38,8 +39,8 @@ impl Drop for Scratch {
     }
 }
 
-fn check(name: &str, rule: Rule, voxels: Voxels) {
-    let settings = Settings { rule, page_bytes: 16 * 1024, voxels };
+fn check(name: &str, rule: Rule, voxels: Voxels, pages: PageForm) {
+    let settings = Settings { rule, page_bytes: 16 * 1024, pages, voxels };
     let (file, model) = Scratch::packed(name, &settings);
     let opened = Prepared::open(&file.0).unwrap_or_else(|e| panic!("{e}"));
     let built = Prepared::new(model, &settings).unwrap();
@@ -51,6 +52,7 @@ fn check(name: &str, rule: Rule, voxels: Voxels) {
     assert_eq!((opened.requires(), opened.tables()), (built.requires(), built.tables()));
     assert_eq!(opened.warnings, built.warnings);
     assert_eq!(opened.packed.voxels(), voxels.count());
+    assert_eq!(opened.packed.compact_pages(), if pages == PageForm::Compact { opened.packed.pages() } else { 0 });
     assert_eq!(opened.packed.placed_pages(), built.packed.placed_pages());
     for page in 0..built.packed.pages() as u32 {
         assert_eq!(opened.packed.primitives_of(page), built.packed.primitives_of(page));
@@ -66,11 +68,12 @@ fn check(name: &str, rule: Rule, voxels: Voxels) {
 #[test]
 fn what_comes_out_is_what_went_in() {
     let midpoints = Rule::Midpoint(midpoint::Settings::default());
-    check("spd:balls:3", Rule::SurfaceArea, Voxels::One);
-    check("spd:teapot:5", Rule::SurfaceArea, Voxels::Grid([2, 3, 1]));
-    check("spd:tree:5", midpoints, Voxels::Adaptive(9));
-    check("cornell:mirror", midpoints, Voxels::One);
-    check("terrain:3000", Rule::SurfaceArea, Voxels::Adaptive(4));
+    check("spd:balls:3", Rule::SurfaceArea, Voxels::One, PageForm::Full);
+    check("spd:teapot:5", Rule::SurfaceArea, Voxels::One, PageForm::Compact);
+    check("spd:teapot:5", Rule::SurfaceArea, Voxels::Grid([2, 3, 1]), PageForm::Full);
+    check("spd:tree:5", midpoints, Voxels::Adaptive(9), PageForm::Full);
+    check("cornell:mirror", midpoints, Voxels::One, PageForm::Compact);
+    check("terrain:3000", Rule::SurfaceArea, Voxels::Adaptive(4), PageForm::Compact);
 }
 
 /// Opens a file of these bytes: refused with a line that names it, or else it must be the scene that was written.

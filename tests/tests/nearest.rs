@@ -11,6 +11,7 @@ use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walked, nearest, occlud
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
 use hybray_pyraclip::wide;
+use hybray_scene::PageForm;
 use hybray_tests::{Random, brute_force, camera_rays, close_rays, degenerate, random_ray, rays_at, scene, soup, walls};
 
 fn trees() -> Vec<Settings> {
@@ -19,9 +20,21 @@ fn trees() -> Vec<Settings> {
         [4096, 16 * 1024, 64 * 1024].map(|page_bytes| Settings { rule, page_bytes, ..Settings::default() })
     });
     let cut = [Rule::SurfaceArea, midpoints(9, 3)].into_iter().flat_map(|rule| {
-        [Voxels::Grid([3, 2, 2]), Voxels::Adaptive(7)].map(|voxels| Settings { rule, page_bytes: 16 * 1024, voxels })
+        [Voxels::Grid([3, 2, 2]), Voxels::Adaptive(7)].map(|voxels| Settings {
+            rule,
+            page_bytes: 16 * 1024,
+            voxels,
+            ..Settings::default()
+        })
     });
-    whole.chain(cut).collect()
+    let compact = [(Rule::SurfaceArea, 64 * 1024), (Rule::SurfaceArea, 4096), (midpoints(9, 3), 16 * 1024)];
+    let compact = compact.map(|(rule, page_bytes)| Settings {
+        rule,
+        page_bytes,
+        pages: PageForm::Compact,
+        ..Settings::default()
+    });
+    whole.chain(cut).chain(compact).collect()
 }
 
 /// Rays of a bundle: all lengths that differ in what becomes of them, halves and single rays included.

@@ -6,6 +6,7 @@ use hybray::prepare::Prepared;
 use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
 use hybray_native::{DispatcherAt, Farm};
+use hybray_scene::PageForm;
 use hybray_scheduler::Options;
 use hybray_scheduler::policy::Tiles;
 use hybray_tests::{Random, drawn, scene};
@@ -30,10 +31,18 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
         ..model::Settings::default()
     };
     let midpoints = Rule::Midpoint(midpoint::Settings { depth_max: 18, objects_max: 12 });
-    let trees = [(Rule::SurfaceArea, 65_536), (midpoints, 4096), (Rule::SurfaceArea, 4096), (midpoints, 65_536)];
-    let prepared = trees.map(|(rule, page_bytes)| {
-        let prepared = Prepared::new(model.clone(), &Settings { rule, page_bytes, ..Settings::default() });
-        prepared.unwrap_or_else(|e| panic!("{name} {rule:?} {page_bytes}: {e}"))
+    let (full, compact) = (PageForm::Full, PageForm::Compact);
+    let trees = [
+        (Rule::SurfaceArea, 65_536, full),
+        (midpoints, 4096, full),
+        (Rule::SurfaceArea, 4096, full),
+        (midpoints, 65_536, full),
+        (Rule::SurfaceArea, 65_536, compact),
+        (midpoints, 4096, compact),
+    ];
+    let prepared = trees.map(|(rule, page_bytes, pages)| {
+        let prepared = Prepared::new(model.clone(), &Settings { rule, page_bytes, pages, ..Settings::default() });
+        prepared.unwrap_or_else(|e| panic!("{name} {rule:?} {page_bytes} {pages:?}: {e}"))
     });
 
     let alone = Farm {
@@ -52,7 +61,7 @@ fn check(name: &str, size: [u32; 2], filter: &str) {
     let atomics = deck(random, &[Some(1), Some(4), Some(64), None]);
     let dispatchers = deck(random, &[DispatcherAt::Host, DispatcherAt::Node]);
     let kernels = deck(random, &Kernels::available().collect::<Vec<_>>());
-    let trees = deck(random, &[0, 1, 2, 3]);
+    let trees = deck(random, &[0, 1, 2, 3, 4, 5]);
     let tiles = deck(random, &[Tiles::Dynamic, Tiles::Static, Tiles::PixelCount { pixels: 300 }]);
     let together = deck(random, &[true, true, false]);
     for i in 0..DRAWS {

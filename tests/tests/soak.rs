@@ -9,7 +9,7 @@ use hybray::model;
 use hybray::partition::{Voxels, light_caches, owners};
 use hybray::prepare::Prepared;
 use hybray_native::{DispatcherAt, Farm as Threads, plan, trace};
-use hybray_scene::lines_for;
+use hybray_scene::{PageForm, lines_for};
 use hybray_scheduler::policy::{Grid, LinkCost, Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
@@ -43,30 +43,33 @@ impl Drawn {
         let cuts = [Voxels::One, Voxels::Grid([2, 2, 1]), Voxels::Adaptive(5)];
         let all =
             NAMES.iter().flat_map(|name| PAGE_BYTES.iter().zip(cuts).map(move |(&bytes, cut)| (name, bytes, cut)));
-        all.map(|(name, page_bytes, voxels)| {
-            let settings = build::Settings { page_bytes, voxels, ..build::Settings::default() };
-            let prepared = Prepared::new(scene(name), &settings).unwrap_or_else(|e| panic!("{name}: {e}"));
-            let pages = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
-            let farm = Threads {
-                nodes: 1,
-                kernels: kernels(),
-                dispatcher: DispatcherAt::Host,
-                shadow_bundles: false,
-                options: Options { spread: Some(1.0), atomic: None, ..Options::default() },
-            };
-            let frames = SIZES.map(|(size, samples, depth)| {
-                let (size, spp, depth) = (Some(size), Some(samples), Some(depth));
-                let wanted = model::Settings { size, spp, depth, ..model::Settings::default() };
-                let frame = prepared.frame(&prepared.cameras[0], &wanted);
-                let traced = trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).expect(name);
-                assert_eq!(traced.outcome, Outcome::Finished, "{name}");
-                (frame, traced.film, traced.nodes[0].counts)
-            });
-            drop(pages);
-            let name = format!("{name} in {page_bytes}");
-            Self { name, prepared, frames: frames.to_vec() }
-        })
-        .collect()
+        let forms = [PageForm::Full, PageForm::Compact].into_iter().cycle();
+        all.zip(forms)
+            .map(|((name, page_bytes, voxels), pages)| {
+                let settings = build::Settings { page_bytes, pages, voxels, ..build::Settings::default() };
+                let prepared = Prepared::new(scene(name), &settings).unwrap_or_else(|e| panic!("{name}: {e}"));
+                let pages = prepared.packed.open().unwrap_or_else(|e| panic!("{name}: {e}"));
+                let farm = Threads {
+                    nodes: 1,
+                    kernels: kernels(),
+                    dispatcher: DispatcherAt::Host,
+                    shadow_bundles: false,
+                    options: Options { spread: Some(1.0), atomic: None, ..Options::default() },
+                };
+                let frames = SIZES.map(|(size, samples, depth)| {
+                    let (size, spp, depth) = (Some(size), Some(samples), Some(depth));
+                    let wanted = model::Settings { size, spp, depth, ..model::Settings::default() };
+                    let frame = prepared.frame(&prepared.cameras[0], &wanted);
+                    let traced =
+                        trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut |_| true).expect(name);
+                    assert_eq!(traced.outcome, Outcome::Finished, "{name}");
+                    (frame, traced.film, traced.nodes[0].counts)
+                });
+                drop(pages);
+                let name = format!("{name} in {page_bytes}");
+                Self { name, prepared, frames: frames.to_vec() }
+            })
+            .collect()
     }
 }
 

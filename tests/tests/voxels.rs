@@ -28,7 +28,7 @@ fn check(name: &str) {
     for voxels in cuts {
         for rule in [Rule::SurfaceArea, Rule::Midpoint(midpoint::Settings::default())] {
             let what = format!("{name} {voxels:?} {rule:?}");
-            let settings = Settings { rule, page_bytes: 16 * 1024, voxels };
+            let settings = Settings { rule, page_bytes: 16 * 1024, voxels, ..Settings::default() };
             let prepared = Prepared::new(model.clone(), &settings).unwrap_or_else(|e| panic!("{what}: {e}"));
             let packed = &prepared.packed;
             assert_eq!(packed.voxels(), voxels.count(), "{what}");

@@ -46,13 +46,12 @@ const fn primitive_bytes_min(form: PageForm) -> usize {
     }
 }
 
-/// A page under construction: about 740 KB of scratch, so keep one and use it again. All zeros is a good beginning
+/// A page under construction: about 670 KB of scratch, so keep one and use it again. All zeros is a good beginning
 /// ([`bytemuck::Zeroable`]): too large for a stack, it is best zeroed where it lies.
 #[derive(Clone, Copy, Zeroable)]
 #[repr(C)]
 pub struct Scratch {
     nodes: [Node; NODES_MAX],
-    compact_nodes: [CompactNode; NODES_MAX],
     contents: Contents,
     page: [Line; PAGE_BYTES_MAX / 64],
 }
@@ -303,7 +302,7 @@ fn fill<P: Primitives>(
     if part.count as usize * primitive_bytes_min(form) > bytes_max {
         return Err(Full);
     }
-    let Scratch { nodes, compact_nodes, contents, page } = scratch;
+    let Scratch { nodes, contents, page } = scratch;
     let magic = match form {
         PageForm::Full => Header::MAGIC,
         PageForm::Compact => Header::MAGIC_COMPACT,
@@ -338,16 +337,6 @@ fn fill<P: Primitives>(
     }
     header.bytes = bytes as u32;
     let nodes = &nodes[..header.nodes as usize];
-    let compact_nodes = &mut compact_nodes[..header.nodes as usize];
-    if form == PageForm::Compact {
-        for (to, node) in compact_nodes.iter_mut().zip(nodes) {
-            let Some(compact) = CompactNode::new(node) else {
-                // No steps hold these boxes: this page is a full one.
-                return fill(subject, part, source, bytes_max, PageForm::Full, scratch);
-            };
-            *to = compact;
-        }
-    }
 
     let page: &mut [u8] = bytemuck::cast_slice_mut(&mut page[..]);
     let mut at = 0;
@@ -365,7 +354,13 @@ fn fill<P: Primitives>(
             put(bytemuck::cast_slice(&contents.normals[..header.normals as usize]));
         }
         PageForm::Compact => {
-            put(bytemuck::cast_slice(compact_nodes));
+            for node in nodes {
+                let Some(compact) = CompactNode::new(node) else {
+                    // No steps hold these boxes: this page is a full one.
+                    return fill(subject, part, source, bytes_max, PageForm::Full, scratch);
+                };
+                put(bytemuck::bytes_of(&compact));
+            }
             put(bytemuck::cast_slice(&contents.spheres[..ns]));
             put(bytemuck::cast_slice(&contents.compact[..nt]));
             put(bytemuck::cast_slice(&contents.cones[..nc]));

@@ -415,7 +415,15 @@ impl<S: Simd> Walker<S> {
     }
 
     #[inline(always)]
-    fn leaf<'f>(&mut self, number: u32, page: &PageView<'_>, body: &impl Form<'f>, kind: Kind, start: usize, count: usize) {
+    fn leaf<'f>(
+        &mut self,
+        number: u32,
+        page: &PageView<'_>,
+        body: &impl Form<'f>,
+        kind: Kind,
+        start: usize,
+        count: usize,
+    ) {
         self.counts.blocks += count as u64;
         // A broadcast costs no more than a load of what was broadcast before.
         let lanes = self.kernel.splat(self.simd.splat4(0.0));

@@ -4,7 +4,7 @@
 mod common;
 
 use common::scenes::{mixed, table};
-use common::{Random, Rule, Shapes, build};
+use common::{Random, Rule, Shapes, build, build_compact};
 use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk, Walked, occluded};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
@@ -109,7 +109,8 @@ fn check(what: &str, shapes: &Shapes, scene: &Resident<'_, Share<'_>>, rays: &[R
 fn check_shapes(name: &str, shapes: &Shapes, seed: u64, rounds: usize, totals: &mut Totals) {
     let mut random = Random(seed);
     for rule in [Rule::Sah(sah::Settings::default()), Rule::Midpoint(midpoint::Settings::default(), 16)] {
-        let Ok(built) = build(shapes, rule, [1024, 4096][seed as usize % 2]) else { continue };
+        let cut = [build, build_compact][seed as usize / 2 % 2];
+        let Ok(built) = cut(shapes, rule, [1024, 4096][seed as usize % 2]) else { continue };
         let views = built.views();
         let resident = built.resident(&views);
         let bounds = built.nodes.first().map(|node| node.bounds());

@@ -4,7 +4,7 @@
 mod common;
 
 use common::scenes::mixed;
-use common::{Random, Rule, Shapes, build};
+use common::{Random, Rule, Shapes, build, build_compact};
 use hybray_bintree::walk::{Counts, Hit, Resident, Stack, Walk, Walked, nearest};
 use hybray_bintree::{midpoint, sah};
 use hybray_geometry::simd::Kernels;
@@ -47,7 +47,8 @@ fn rays_of_a_bundle_go_on_where_their_pages_are() {
         let mut random = Random(seed);
         let shapes = Shapes::new(mixed(200 + 150 * seed as usize, seed));
         for rule in [Rule::Sah(sah::Settings::default()), Rule::Midpoint(midpoint::Settings::default(), 4)] {
-            let built = build(&shapes, rule, [1024, 4096][seed as usize % 2]).unwrap();
+            let cut = [build, build_compact][seed as usize / 2 % 2];
+            let built = cut(&shapes, rule, [1024, 4096][seed as usize % 2]).unwrap();
             let views = built.views();
             let resident = built.resident(&views);
             let mut hang = vec![0; built.nodes.len() + views.len()];

@@ -24,7 +24,7 @@ use crate::partition::{Plan, Step, Voxels};
 use hybray_bintree::cut::CutError;
 use hybray_bintree::{Item, midpoint};
 use hybray_geometry::Aabb;
-use hybray_scene::{DirectoryError, Line, PAGE_BYTES_MAX, PageError};
+use hybray_scene::{DirectoryError, Line, PAGE_BYTES_MAX, PageError, PageForm};
 use packed::Assembler;
 use rayon::prelude::*;
 use tree::VoxelTree;
@@ -45,13 +45,15 @@ pub struct Settings {
     pub rule: Rule,
     /// Most bytes of a page.
     pub page_bytes: usize,
+    /// In which form pages are.
+    pub pages: PageForm,
     /// How the scene is cut.
     pub voxels: Voxels,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { rule: Rule::SurfaceArea, page_bytes: PAGE_BYTES_MAX, voxels: Voxels::One }
+        Self { rule: Rule::SurfaceArea, page_bytes: PAGE_BYTES_MAX, pages: PageForm::Full, voxels: Voxels::One }
     }
 }
 

@@ -8,7 +8,9 @@ use hybray_bintree::cut::FLAT;
 use hybray_bintree::walk::Resident;
 use hybray_bintree::{Forest, top};
 use hybray_geometry::Aabb;
-use hybray_scene::{BLOCK, Directory, Kind, Line, Node, PageEntry, PageView, Slot, Tables, lines_for};
+use hybray_scene::{
+    BLOCK, Directory, Header, Kind, Line, Node, PageEntry, PageForm, PageView, Slot, Tables, lines_for,
+};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -127,6 +129,13 @@ impl Packed {
     #[must_use]
     pub fn pages(&self) -> usize {
         self.index.entries.len()
+    }
+
+    /// How many of them are in compact form: all or none, but for those whose boxes need the full one.
+    #[must_use]
+    pub fn compact_pages(&self) -> usize {
+        let header = |page| -> &Header { bytemuck::from_bytes(&self.page(page)[0].0) };
+        (0..self.pages() as u32).filter(|&page| header(page).form() == PageForm::Compact).count()
     }
 
     /// The bytes of a page, padded to whole lines.

@@ -47,10 +47,10 @@ impl VoxelTree {
         depth: u32,
     ) -> Result<Self, CutError> {
         match settings.rule {
-            Rule::SurfaceArea => surface_area(&mut items, source, settings.page_bytes, depth),
+            Rule::SurfaceArea => surface_area(&mut items, source, settings, depth),
             Rule::Midpoint(rule) => {
                 let rule = midpoint::Settings { depth_max: rule.depth_max.min(48 - depth), ..rule };
-                midpoints(items, source, rule, settings.page_bytes)
+                midpoints(items, source, rule, settings)
             }
         }
     }
@@ -59,7 +59,7 @@ impl VoxelTree {
 fn surface_area<P: Primitives + Sync>(
     items: &mut [Item],
     source: &P,
-    page_bytes: usize,
+    settings: &Settings,
     depth: u32,
 ) -> Result<VoxelTree, CutError> {
     let stop_at = sah::Settings { stop_at: CHUNK, depth, ..sah::Settings::default() };
@@ -84,7 +84,7 @@ fn surface_area<P: Primitives + Sync>(
             |(nodes, forests, scratch), part| {
                 let used = built(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
                 reinsert::reinsert(&mut nodes[..used], &mut vec![Link::EMPTY; used], depth);
-                cut_chunk(&nodes[..used], part, source, page_bytes, forests, scratch)
+                cut_chunk(&nodes[..used], part, source, settings, forests, scratch)
             },
         )
         .collect::<Result<_, _>>()?;
@@ -110,7 +110,7 @@ fn midpoints<P: Primitives>(
     mut items: Vec<Item>,
     source: &P,
     rule: midpoint::Settings,
-    page_bytes: usize,
+    settings: &Settings,
 ) -> Result<VoxelTree, CutError> {
     let count = items.len();
     let Some(&first) = items.first() else { return Ok(VoxelTree { tops: Vec::new(), chunks: Vec::new() }) };
@@ -120,7 +120,7 @@ fn midpoints<P: Primitives>(
     let tree = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &rule);
     let (used, held) = (tree.nodes.len(), tree.items.len());
     midpoint::tighten(&mut nodes[..used], &leaves[..held]);
-    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, page_bytes, &mut Vec::new(), &mut zeroed_box())?;
+    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, settings, &mut Vec::new(), &mut zeroed_box())?;
     let root = BinaryNode { second: 0, ..nodes[0] };
     Ok(VoxelTree { tops: vec![root], chunks: vec![chunk] })
 }
@@ -139,21 +139,30 @@ fn cut_chunk<P: Primitives>(
     nodes: &[BinaryNode],
     items: &[Item],
     source: &P,
-    page_bytes: usize,
+    settings: &Settings,
     forests: &mut Vec<Forest>,
     scratch: &mut cut::Scratch,
 ) -> Result<Chunk, CutError> {
     let mut chunk = Chunk { pages: Vec::new(), events: Vec::new() };
     forests.resize(nodes.len().max(forests.len()), Forest::EMPTY);
-    cut::pages(nodes, items, source, page_bytes, forests, scratch, &mut |aabb, cut| match cut {
-        Cut::Above => chunk.events.push((*aabb, None)),
-        Cut::Page(lines) => {
-            let page = PageView::of_valid(lines);
-            let about =
-                PageAbout { bytes: page.header.bytes, primitives: primitives_in(&page), hash: hash_page(lines) };
-            chunk.events.push((*aabb, Some(about)));
-            chunk.pages.push(lines.to_vec());
-        }
-    })?;
+    cut::pages(
+        nodes,
+        items,
+        source,
+        settings.page_bytes,
+        settings.pages,
+        forests,
+        scratch,
+        &mut |aabb, cut| match cut {
+            Cut::Above => chunk.events.push((*aabb, None)),
+            Cut::Page(lines) => {
+                let page = PageView::of_valid(lines);
+                let about =
+                    PageAbout { bytes: page.header.bytes, primitives: primitives_in(&page), hash: hash_page(lines) };
+                chunk.events.push((*aabb, Some(about)));
+                chunk.pages.push(lines.to_vec());
+            }
+        },
+    )?;
     Ok(chunk)
 }

@@ -168,10 +168,11 @@ mod tests {
     use super::*;
     use crate::import;
     use hybray_bintree::midpoint;
+    use hybray_scene::PageForm;
 
-    fn check(name: &str, voxels: Voxels, rule: Rule) {
+    fn check(name: &str, voxels: Voxels, rule: Rule, pages: PageForm) {
         let model = import::load(name).unwrap();
-        let settings = Settings { rule, page_bytes: 8192, voxels };
+        let settings = Settings { rule, page_bytes: 8192, pages, voxels };
         let expected = build(&model, &settings).unwrap();
         let materials = model.materials.len();
         let smooth = model.meshes.iter().filter(|m| !m.normals.is_empty()).map(|m| m.triangles.len() as u64).sum();
@@ -201,11 +202,13 @@ mod tests {
     fn the_pages_of_the_build_in_memory() {
         let midpoints = Rule::Midpoint(midpoint::Settings::default());
         for voxels in [Voxels::One, Voxels::Grid([3, 2, 2]), Voxels::Adaptive(5)] {
-            check("spd:balls:3", voxels, Rule::SurfaceArea);
-            check("spd:teapot:4", voxels, Rule::SurfaceArea);
-            check("spd:tree:5", voxels, midpoints);
-            check("cornell:mirror", voxels, midpoints);
-            check("terrain:40000", voxels, Rule::SurfaceArea);
+            check("spd:balls:3", voxels, Rule::SurfaceArea, PageForm::Full);
+            check("spd:teapot:4", voxels, Rule::SurfaceArea, PageForm::Full);
+            check("spd:teapot:4", voxels, midpoints, PageForm::Compact);
+            check("spd:tree:5", voxels, midpoints, PageForm::Full);
+            check("cornell:mirror", voxels, midpoints, PageForm::Compact);
+            check("terrain:40000", voxels, Rule::SurfaceArea, PageForm::Full);
+            check("terrain:40000", voxels, Rule::SurfaceArea, PageForm::Compact);
         }
     }
 

@@ -280,7 +280,7 @@ fn a_scene_is_known_by_what_it_holds() {
     for name in ["terrain:2000", "spd:teapot:3", "spd:tree:4", "cornell:mirror"] {
         let usual = hash(model(name), &Settings::default());
         for (rule, voxels) in [(Rule::SurfaceArea, "1"), (Rule::SurfaceArea, "5"), (midpoint, "2x3x1")] {
-            let settings = Settings { rule, page_bytes: 4096, voxels: voxels.parse().unwrap() };
+            let settings = Settings { rule, page_bytes: 4096, voxels: voxels.parse().unwrap(), ..Settings::default() };
             assert_eq!(hash(model(name), &settings), usual, "{name}, {settings:?}");
         }
         let changes: [fn(&mut Model); 9] = [

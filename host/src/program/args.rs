@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hybray_bintree::midpoint;
 use hybray_geometry::simd::Kernels;
-use hybray_scene::PAGE_BYTES_MAX;
+use hybray_scene::{PAGE_BYTES_MAX, PageForm};
 use hybray_scheduler::policy::{Criterion, Policy, Tiles};
 use hybray_scheduler::{Options, Settings as NodeSettings};
 use hybray_simulated::{MACHINES, Machine, NODES_MAX};
@@ -55,7 +55,7 @@ pub(super) struct SceneArgs {
     pub scene: String,
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct TreeArgs {
     /// How the tree is split. The picture does not depend on it
     #[arg(long, value_enum, default_value_t = Tree::Sah, help_heading = "Tree")]
@@ -70,6 +70,10 @@ pub(super) struct TreeArgs {
     /// of which a node has room for 32
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4096..=65536), help_heading = "Tree")]
     pub page_bytes: Option<u32>,
+    /// In which form pages are: full ones are faster, compact ones take half the memory. The picture does not depend on it.
+    /// Default: full; for nodes with a budget compact if full ones do not fit
+    #[arg(long, value_enum, value_name = "FORM", help_heading = "Tree")]
+    pub pages: Option<Pages>,
     /// Cut the scene into voxels: a grid, such as 4x8x1, or so many of equal work, such as 32. The picture does not
     /// depend on it
     #[arg(long, value_name = "N|WxHxD", help_heading = "Tree")]
@@ -82,7 +86,12 @@ impl TreeArgs {
         self.settings_with(PAGE_BYTES_MAX as u32)
     }
 
-    /// The same, with pages of `page_bytes` at most if nobody said how large they may be.
+    /// The same, with compact pages.
+    pub fn compact(&self) -> Self {
+        Self { pages: Some(Pages::Compact), ..self.clone() }
+    }
+
+    /// What was asked for, with pages of `page_bytes` at most if nobody said how large they may be.
     pub fn settings_with(&self, page_bytes: u32) -> Settings {
         let rule = match self.tree {
             Tree::Sah => Rule::SurfaceArea,
@@ -91,7 +100,11 @@ impl TreeArgs {
             }
         };
         let page_bytes = self.page_bytes.unwrap_or(page_bytes) as usize;
-        Settings { rule, page_bytes, voxels: self.voxels.unwrap_or_default() }
+        let pages = match self.pages {
+            None | Some(Pages::Full) => PageForm::Full,
+            Some(Pages::Compact) => PageForm::Compact,
+        };
+        Settings { rule, page_bytes, pages, voxels: self.voxels.unwrap_or_default() }
     }
 }
 
@@ -244,6 +257,14 @@ pub(super) enum Tree {
     Sah,
     /// Midpoints, as in the 1995 report
     Midpoint,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Pages {
+    /// Boxes and triangles as the walk wants them
+    Full,
+    /// Boxes of eight bits a side, and vertices that triangles share
+    Compact,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

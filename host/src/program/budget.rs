@@ -79,6 +79,32 @@ impl Farm<'_> {
         }
     }
 
+    /// `prepared`, or the same scene in compact pages by `again` if nobody said which form they should have, and full ones do
+    /// not fit.
+    ///
+    /// # Errors
+    /// Those of `again`.
+    pub fn choose_form(
+        &self,
+        prepared: Prepared,
+        again: impl FnOnce(&TreeArgs) -> Result<Prepared>,
+    ) -> Result<Prepared> {
+        if self.packed || self.tree.pages.is_some() || self.fits(&prepared)? {
+            return Ok(prepared);
+        }
+        drop(prepared);
+        again(&self.tree.compact())
+    }
+
+    /// Whether all nodes have room. Light caches can be smaller: they are no reason for other pages.
+    fn fits(&self, prepared: &Prepared) -> Result<bool> {
+        let opened = prepared.packed.open()?;
+        let scene = prepared.scene(&opened);
+        let (pages, voxels) = (prepared.packed.placed_pages(), prepared.packed.voxels());
+        let fit = self.wanted(&scene).fit_picture(&pages, voxels, &scene, self.light_cache, None);
+        Ok(!matches!(fit, Err(NoFit::Misfit(_) | NoFit::Plan(PlanError::Memory { .. }))))
+    }
+
     /// Which nodes are given no tiles: entry 0 is the host's.
     ///
     /// # Errors

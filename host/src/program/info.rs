@@ -38,8 +38,9 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
     let bytes = prepared.packed.page_bytes();
     writeln!(
         out,
-        "pages        {} in {bytes} bytes: {:.1} bytes a primitive, {nodes} nodes",
+        "pages        {} in {bytes} bytes, {} form: {:.1} bytes a primitive, {nodes} nodes",
         prepared.packed.pages(),
+        if prepared.packed.compact_pages() > 0 { "compact" } else { "full" },
         bytes as f64 / primitives as f64
     )?;
     writeln!(out, "voxels       {}", prepared.packed.voxels())?;

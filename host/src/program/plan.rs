@@ -24,6 +24,8 @@ struct Report<'a> {
     memory: u64,
     scheduler: &'static str,
     pages: usize,
+    /// Of which so many are in compact form.
+    compact_pages: usize,
     page_bytes: u64,
     page_bytes_max: usize,
     voxels: u32,
@@ -104,23 +106,26 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
     let json = args.json.as_deref().map(ReportFile::create).transpose()?;
     let page_bytes = page_bytes_for(args.memory, args.nodes);
     let (prepared, _) = prepare(&args.scene, &args.tree, None, page_bytes)?;
-    let pages = prepared.packed.open()?;
-    let scene = prepared.scene(&pages);
-    let sizes = Sizes::of(&scene);
-    let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
-    let pilot = Pilot::of_policy(args.scheduler, &scene, &frame, args.copies.pilot).filter(|_| args.nodes > 1);
+    let page_memory = |pages_bytes| args.page_memory.map(|page_memory| page_memory.bytes(pages_bytes));
     let farm = Farm {
         nodes: args.nodes,
         memory: args.memory,
-        page_memory: args.page_memory.map(|page_memory| page_memory.bytes(sizes.pages_bytes)),
+        page_memory: page_memory(prepared.packed.page_bytes()),
         policy: args.scheduler,
         light_cache: args.copies.light_cache,
-        pilot: pilot.as_ref(),
+        pilot: None,
         first_dispatches: false,
         nodes_most: NODES_MAX,
         tree: &args.tree,
         packed: is_packed(&args.scene.scene),
     };
+    let prepared = farm.choose_form(prepared, |tree| Ok(prepare(&args.scene, tree, None, page_bytes)?.0))?;
+    let pages = prepared.packed.open()?;
+    let scene = prepared.scene(&pages);
+    let sizes = Sizes::of(&scene);
+    let frame = prepared.frame(&prepared.cameras[0], &Settings::default());
+    let pilot = Pilot::of_policy(args.scheduler, &scene, &frame, args.copies.pilot).filter(|_| args.nodes > 1);
+    let farm = Farm { page_memory: page_memory(sizes.pages_bytes), pilot: pilot.as_ref(), ..farm };
     let fit = farm.fit(&prepared, &scene)?;
     let least = farm.least(&scene);
     let progress = args.machine.map(|machine| {
@@ -136,6 +141,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<End> {
         memory: args.memory,
         scheduler: name_of(args.scheduler),
         pages: sizes.pages,
+        compact_pages: prepared.packed.compact_pages(),
         page_bytes: sizes.pages_bytes,
         page_bytes_max: sizes.page_bytes_max,
         voxels: prepared.packed.voxels(),
@@ -177,9 +183,10 @@ fn table(report: &Report<'_>, fit: &Fit, farm: &Farm<'_>, least: Least) -> Strin
     ));
     line(format_args!(""));
     line(format_args!(
-        "scene      {}: {} page{} of {} bytes at most, {} bytes in all, in {} voxel{}",
+        "scene      {}: {} {}page{} of {} bytes at most, {} bytes in all, in {} voxel{}",
         report.scene,
         report.pages,
+        if report.compact_pages > 0 { "compact " } else { "" },
         s(report.pages as u64),
         report.page_bytes_max,
         report.page_bytes,

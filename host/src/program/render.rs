@@ -1,6 +1,6 @@
 //! `hybray render`.
 
-use super::args::{RenderArgs, When, Where};
+use super::args::{RenderArgs, TreeArgs, When, Where};
 use super::budget::{Farm as BudgetFarm, size};
 use super::keep::{Keeper, State};
 use super::report::{
@@ -96,28 +96,32 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         options: args.work.options(args.spread, args.tile, &settings),
     };
 
+    let budget = args.memory.map(|memory| BudgetFarm {
+        nodes,
+        memory,
+        page_memory: None,
+        policy,
+        light_cache: args.copies.light_cache,
+        pilot: None,
+        first_dispatches: farm.dispatcher == DispatcherAt::Node,
+        nodes_most: NODES_MAX,
+        tree: &args.tree,
+        packed,
+    });
+    if let Some(budget) = &budget {
+        let again = |tree: &TreeArgs| Ok(prepare(&args.scene, tree, args.size, page_bytes)?.0);
+        prepared = budget.choose_form(prepared, again)?;
+    }
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     let (mut fit, mut barred, mut grid) = (None, Vec::new(), None);
-    if let Some(memory) = args.memory {
-        let light_cache = args.copies.light_cache;
+    if let Some(budget) = budget {
         let pilot = Pilot::of_policy(policy, &scene, &frame, args.copies.pilot).filter(|_| nodes > 1);
-        let farm = BudgetFarm {
-            nodes,
-            memory,
-            page_memory: None,
-            policy,
-            light_cache,
-            pilot: pilot.as_ref(),
-            first_dispatches: farm.dispatcher == DispatcherAt::Node,
-            nodes_most: NODES_MAX,
-            tree: &args.tree,
-            packed,
-        };
+        let farm = BudgetFarm { pilot: pilot.as_ref(), ..budget };
         let fit = fit.insert(farm.fit(&prepared, &scene)?);
         barred = farm.barred(args.work.demand_driven, &prepared, fit)?;
         grid = farm.grid(args.work.ways, &scene)?;
-        show.line(&budget_line(fit, nodes, memory, policy));
+        show.line(&budget_line(fit, nodes, budget.memory, policy));
     }
     let subject = || prepared.subject(&pages, &frame);
     let kept = kept(args, film.as_deref(), &subject, &show)?;

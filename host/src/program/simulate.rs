@@ -39,13 +39,33 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     // One scene for all runs: its pages are such as the smallest nodes can have.
     let page_sizes = args.memory.iter().flat_map(|&memory| args.nodes.iter().map(move |&n| page_bytes_for(memory, n)));
     let page_bytes = page_sizes.min().unwrap_or(PAGE_BYTES_MAX as u32);
-    let (prepared, _) = prepare(&args.scene, &args.tree, args.size, page_bytes)?;
+    let (mut prepared, _) = prepare(&args.scene, &args.tree, args.size, page_bytes)?;
     prepared.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
     show.line(&format!("{}: {} primitives", args.scene.scene, prepared.primitives.iter().sum::<u64>()));
     let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
     let wanted = Settings { size: args.size, spp: args.spp, depth: args.depth, seed: args.seed, ..Settings::default() };
     let frame = prepared.frame(&camera, &wanted);
     check_camera(&frame)?;
+    let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
+    let budgets = args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm)));
+    let budget = |(memory, (policy, nodes))| Farm {
+        nodes,
+        memory,
+        page_memory: None,
+        policy,
+        light_cache: args.copies.light_cache,
+        pilot: None,
+        first_dispatches: matches!(args.dispatcher, Where::Node),
+        nodes_most: NODES_MAX,
+        tree: &args.tree,
+        packed: is_packed(&args.scene.scene),
+    };
+    // One node alone has the whole scene.
+    for farm in budgets.clone().map(budget).filter(|farm| farm.nodes > 1) {
+        let page_memory = args.page_memory.map(|page_memory| page_memory.bytes(prepared.packed.page_bytes()));
+        let farm = Farm { page_memory, ..farm };
+        prepared = farm.choose_form(prepared, |tree| Ok(prepare(&args.scene, tree, args.size, page_bytes)?.0))?;
+    }
     let pages = prepared.packed.open()?;
     let scene = prepared.scene(&pages);
     let pages_bytes = Sizes::of(&scene).pages_bytes;
@@ -56,24 +76,11 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
         Where::Host => HOST,
         Where::Node => 1,
     };
-    // One node alone has the whole scene.
     let criterion = args.work.demand_driven;
     let (mut voxels, mut grid) = (Voxels::One, None);
-    let farms = args.scheduler.iter().flat_map(|policy| args.nodes.iter().map(move |&nodes| (*policy, nodes)));
-    for (memory, (policy, nodes)) in args.memory.iter().flat_map(|&m| farms.clone().map(move |farm| (m, farm))) {
-        let packed = is_packed(&args.scene.scene);
-        let farm = Farm {
-            nodes,
-            memory,
-            page_memory,
-            policy,
-            light_cache: args.copies.light_cache,
-            pilot: experiment.pilot(policy).filter(|_| nodes > 1),
-            first_dispatches: experiment.dispatcher != HOST,
-            nodes_most: NODES_MAX,
-            tree: &args.tree,
-            packed,
-        };
+    for farm in budgets.map(budget) {
+        let (nodes, pilot) = (farm.nodes, experiment.pilot(farm.policy));
+        let farm = Farm { page_memory, pilot: pilot.filter(|_| nodes > 1), ..farm };
         if nodes > 1 {
             farm.barred(criterion, &prepared, &farm.fit(&prepared, &scene)?)?;
             grid = farm.grid(args.work.ways, &scene)?;

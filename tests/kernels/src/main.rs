@@ -21,6 +21,7 @@ use clap::Parser;
 use hybray::build::{self, Source};
 use hybray::prepare::Prepared;
 use hybray_geometry::Ray;
+use hybray_scene::PageForm;
 use serde::Serialize;
 
 use clustered::{Form, MEDIUM, PRESETS};
@@ -60,6 +61,8 @@ struct Report {
     pages: usize,
     /// Of our pages and their directory: what a node holds. What the host's allocator gave for them is in `builds`.
     page_bytes: u64,
+    /// The same of compact pages.
+    compact_bytes: u64,
     kernels: &'static str,
     /// As 31305 is 3.13.5.
     embree: Option<u32>,
@@ -118,23 +121,32 @@ fn report(args: &Args) -> anyhow::Result<Report> {
     let primary = hybray_tests::camera_rays(&model, 2f32.powi(scale_log2), args.side);
     let settings = build::Settings::default();
 
-    let pack = || Built::of("hybray", || build::build(&model, &settings));
-    let (packed, mut built) = pack();
-    // What the system mapped is no allocator's. Pages are copied there when all else is gone, hardly one chunk twice.
-    built.kept_bytes += packed?.mapped_bytes();
-    built.peak_bytes = built.peak_bytes.max(built.kept_bytes);
-    again(&mut built, args.builds, pack);
-    let mut builds = vec![built];
+    let compactly = build::Settings { pages: PageForm::Compact, ..settings };
+    let mut builds = Vec::new();
+    for (name, settings) in [("hybray", &settings), ("hybray compact", &compactly)] {
+        let pack = || Built::of(name, || build::build(&model, settings));
+        let (packed, mut built) = pack();
+        // What the system mapped is no allocator's. Pages are copied there when all else is gone, hardly one chunk twice.
+        built.kept_bytes += packed?.mapped_bytes();
+        built.peak_bytes = built.peak_bytes.max(built.kept_bytes);
+        again(&mut built, args.builds, pack);
+        builds.push(built);
+    }
 
     let prepared = Prepared::new(model.clone(), &settings)?;
+    let compact = build::build(&model, &compactly)?;
+    let compact_pages = compact.open()?;
     let start = Instant::now();
     let pages = prepared.packed.open()?;
     let validation_seconds = start.elapsed().as_secs_f64();
     let scene = prepared.scene(&pages);
     let sets = rays::sets(&prepared, &scene, primary);
 
-    let mut engines: Vec<Box<dyn Engine + '_>> =
-        vec![Box::new(Single::new(pages.resident())), Box::new(Bundles::new(pages.resident()))];
+    let mut engines: Vec<Box<dyn Engine + '_>> = vec![
+        Box::new(Single::new("hybray single", pages.resident())),
+        Box::new(Single::new("hybray compact", compact_pages.resident())),
+        Box::new(Bundles::new(pages.resident())),
+    ];
     let given = clustered::Given::new(&source);
     for form in [Form::Compressed, Form::Binary].into_iter().filter(|_| !args.alone) {
         let (engine, built) = clustered_best(&given, form, &sets, args.builds);
@@ -164,6 +176,7 @@ fn report(args: &Args) -> anyhow::Result<Report> {
         triangles: prepared.primitives[0],
         pages: prepared.packed.pages(),
         page_bytes: prepared.packed.page_bytes() + prepared.packed.directory_bytes(),
+        compact_bytes: compact.page_bytes() + compact.directory_bytes(),
         kernels: hybray_tests::kernels().name(),
         embree: version,
         builds,
@@ -273,13 +286,14 @@ mod tests {
     #[test]
     fn triangles() {
         let report = check("spd:teapot:3");
-        let expected = ["hybray single", "hybray bundles", "obvhs CWBVH", "obvhs BVH2"];
-        assert_eq!(names(&report, 0)[..4], expected);
+        let expected = ["hybray single", "hybray compact", "hybray bundles", "obvhs CWBVH", "obvhs BVH2"];
+        assert_eq!(names(&report, 0)[..5], expected);
+        assert!(report.compact_bytes * 100 < report.page_bytes * 60, "{} {}", report.compact_bytes, report.page_bytes);
         if report.embree.is_none() {
             eprintln!("skipped: Embree, which is not installed");
             return;
         }
-        assert_eq!(names(&report, 0)[4..], ["embree single", "embree packets", "embree streams"]);
+        assert_eq!(names(&report, 0)[5..], ["embree single", "embree packets", "embree streams"]);
     }
 
     #[test]

@@ -34,22 +34,25 @@ fn answer(hit: &Hit) -> Answer {
 }
 
 /// One ray after another.
-pub struct Single<'a>(Walker<'a>);
+pub struct Single<'a> {
+    name: &'static str,
+    walker: Walker<'a>,
+}
 
 impl<'a> Single<'a> {
     /// Over pages that are all at hand.
-    pub fn new(scene: Resident<'a>) -> Self {
-        Self(Walker::new(scene))
+    pub fn new(name: &'static str, scene: Resident<'a>) -> Self {
+        Self { name, walker: Walker::new(scene) }
     }
 }
 
 impl Engine for Single<'_> {
     fn name(&self) -> &'static str {
-        "hybray single"
+        self.name
     }
 
     fn trace(&mut self, kind: Kind, rays: &[Ray], out: &mut [Answer]) -> bool {
-        let Walker { scene, kernels, stack, counts } = &mut self.0;
+        let Walker { scene, kernels, stack, counts } = &mut self.walker;
         for (ray, out) in rays.iter().zip(out) {
             *out = if !kind.is_any() {
                 answer(&walk::nearest(*kernels, scene, ray, stack, counts))
@@ -63,8 +66,8 @@ impl Engine for Single<'_> {
     }
 
     fn counts(&mut self, kind: Kind, rays: &[Ray]) -> Option<Counts> {
-        self.0.counts = walk::Counts::default();
-        self.trace(kind, rays, &mut vec![Answer::MISS; rays.len()]).then(|| self.0.told())
+        self.walker.counts = walk::Counts::default();
+        self.trace(kind, rays, &mut vec![Answer::MISS; rays.len()]).then(|| self.walker.told())
     }
 }
 

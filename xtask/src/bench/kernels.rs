@@ -71,13 +71,21 @@ const SMALL: [(&str, Class); 2] = [("spd:teapot:3", Class::Coarse), ("spd:balls:
 
 const KINDS: [&str; 3] = ["primary", "shadow", "bounce"];
 const SINGLE: &str = "hybray single";
+const COMPACT: &str = "hybray compact";
 const BUNDLES: &str = "hybray bundles";
 const EMBREE: &str = "embree single";
 const OBVHS: &str = "obvhs CWBVH";
 /// Every engine that there may be, in the order of the table.
-const ENGINES: [&str; 7] = [BUNDLES, SINGLE, OBVHS, "obvhs BVH2", EMBREE, "embree packets", "embree streams"];
-const TREES: [&str; 6] =
-    ["hybray", "obvhs CWBVH, medium", "obvhs CWBVH, slow", "obvhs CWBVH, very slow", "obvhs BVH2, medium", "embree"];
+const ENGINES: [&str; 8] = [BUNDLES, SINGLE, COMPACT, OBVHS, "obvhs BVH2", EMBREE, "embree packets", "embree streams"];
+const TREES: [&str; 7] = [
+    "hybray",
+    "hybray compact",
+    "obvhs CWBVH, medium",
+    "obvhs CWBVH, slow",
+    "obvhs CWBVH, very slow",
+    "obvhs BVH2, medium",
+    "embree",
+];
 
 /// The speed of ours over theirs.
 struct Floor {
@@ -88,15 +96,17 @@ struct Floor {
     least: fn(Class) -> Option<f64>,
 }
 
-const FLOORS: [Floor; 8] = [
+const FLOORS: [Floor; 10] = [
     Floor { kind: "primary", ours: BUNDLES, theirs: OBVHS, least: |class| by_class(class, [2.5, 1.5]) },
     Floor { kind: "primary", ours: BUNDLES, theirs: EMBREE, least: |class| (class == Class::Coarse).then_some(1.5) },
     Floor { kind: "primary", ours: BUNDLES, theirs: "embree packets", least: |_| None },
     Floor { kind: "primary", ours: BUNDLES, theirs: SINGLE, least: |_| Some(1.0) },
+    Floor { kind: "primary", ours: COMPACT, theirs: SINGLE, least: |_| None },
     Floor { kind: "shadow", ours: SINGLE, theirs: EMBREE, least: |class| (class != Class::Spheres).then_some(1.3) },
     Floor { kind: "shadow", ours: BUNDLES, theirs: EMBREE, least: |class| (class != Class::Spheres).then_some(1.3) },
     Floor { kind: "bounce", ours: SINGLE, theirs: OBVHS, least: |class| by_class(class, [1.3, 1.3]) },
     Floor { kind: "bounce", ours: SINGLE, theirs: EMBREE, least: |_| None },
+    Floor { kind: "bounce", ours: COMPACT, theirs: SINGLE, least: |_| None },
 ];
 
 fn by_class(class: Class, [coarse, fine]: [f64; 2]) -> Option<f64> {
@@ -111,6 +121,8 @@ fn by_class(class: Class, [coarse, fine]: [f64; 2]) -> Option<f64> {
 const BUILD_MOST: f64 = 2.0;
 /// Bytes for each triangle that remain, and at the peak of the build, at most.
 const BYTES_MOST: [f64; 2] = [64.0, 150.0];
+/// Bytes for each triangle that remain in compact pages, at most.
+const COMPACT_MOST: f64 = 44.0;
 
 /// What `hybray-kernels` tells of a scene.
 #[derive(Clone, Debug, Deserialize)]
@@ -120,6 +132,7 @@ struct Report {
     triangles: u64,
     pages: u64,
     page_bytes: u64,
+    compact_bytes: u64,
     kernels: String,
     embree: Option<u32>,
     builds: Vec<Built>,
@@ -330,6 +343,12 @@ fn figures(report: &Report, class: Class) -> Vec<(String, Figure)> {
     rows.push(("bytes a triangle in pages and directory".to_owned(), bytes(pages, BYTES_MOST[0])));
     rows.push(("bytes a triangle kept".to_owned(), bytes(ours.map(|built| built.kept_bytes), BYTES_MOST[0])));
     rows.push(("bytes a triangle at the peak".to_owned(), bytes(ours.map(|built| built.peak_bytes), BYTES_MOST[1])));
+    let compact = report.built(COMPACT).filter(|_| class != Class::Spheres);
+    let pages = compact.map(|_| report.compact_bytes);
+    rows.push(("bytes a triangle in compact pages and directory".to_owned(), bytes(pages, COMPACT_MOST)));
+    let [kept, peak] = [compact.map(|built| built.kept_bytes), compact.map(|built| built.peak_bytes)];
+    rows.push(("bytes a triangle kept, compact".to_owned(), bytes(kept, COMPACT_MOST)));
+    rows.push(("bytes a triangle at the peak, compact".to_owned(), bytes(peak, BYTES_MOST[1])));
     rows
 }
 
@@ -406,9 +425,10 @@ mod tests {
     use super::*;
 
     /// A scene with round figures: 100 rays of each kind.
-    const RECORDED: &str = r#"{ "scene": "x", "primitives": 10, "triangles": 10, "pages": 1, "page_bytes": 600, "kernels": "avx2", "embree": 31305,
+    const RECORDED: &str = r#"{ "scene": "x", "primitives": 10, "triangles": 10, "pages": 1, "page_bytes": 600, "compact_bytes": 300, "kernels": "avx2", "embree": 31305,
         "builds": [
             { "name": "hybray", "seconds": [1.0, 3.0, 2.0], "kept_bytes": 640, "peak_bytes": 1501 },
+            { "name": "hybray compact", "seconds": [1.0], "kept_bytes": 441, "peak_bytes": 1000 },
             { "name": "obvhs CWBVH, medium", "seconds": [1.0], "kept_bytes": 1, "peak_bytes": 2 } ],
         "validation_seconds": 0.5,
         "sets": [
@@ -440,6 +460,8 @@ mod tests {
         assert_eq!(row(&rows, "bytes a triangle in pages and directory"), "60.00 of 64 at most: kept");
         assert_eq!(row(&rows, "bytes a triangle kept"), "64.00 of 64 at most: kept");
         assert_eq!(row(&rows, "bytes a triangle at the peak"), "150.10 of 150 at most: passed");
+        assert_eq!(row(&rows, "bytes a triangle in compact pages and directory"), "30.00 of 44 at most: kept");
+        assert_eq!(row(&rows, "bytes a triangle kept, compact"), "44.10 of 44 at most: passed");
         assert_eq!(row(&rows, "shadow, hybray single, Mrays/s"), "-");
         let spheres = figures(&report, Class::Spheres);
         assert_eq!(row(&spheres, "primary, hybray bundles / obvhs CWBVH, floor"), "-");
