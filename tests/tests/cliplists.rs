@@ -18,7 +18,10 @@ use hybray_tests::{Random, camera_rays, close_rays, scene, soup, walls};
 fn leaves(scene: &Resident<'_>) -> Vec<(u32, u32, Aabb)> {
     let nodes = (0..).zip(scene.pages).flat_map(|(page, view)| view.body.nodes().map(move |node| (page, node)));
     nodes
-        .flat_map(|(page, node)| node.children().map(move |(slot, child)| (page, child, node.aabb(slot))))
+        .flat_map(|(page, node)| {
+            let children: Vec<_> = node.children().map(|(slot, child)| (page, child, node.aabb(slot))).collect();
+            children
+        })
         .filter(|(_, child, _)| matches!(child, Child::Leaf { kind: Kind::Triangle | Kind::Sphere | Kind::Cone, .. }))
         .map(|(page, child, aabb)| (page, child.pack(), aabb))
         .collect()
@@ -33,6 +36,7 @@ fn entry(ray: &Ray, kernel: &RayKernel, aabb: &Aabb) -> Option<f32> {
 
 /// Every leaf in a subtree: page and packed child.
 fn below(scene: &Resident<'_>, entry: &Entry) -> Vec<(u32, u32)> {
+    let node = |page: u32, index: u32| scene.pages[page as usize].body.nodes().nth(index as usize).unwrap();
     let (mut found, mut waiting) = (Vec::new(), vec![(entry.page, entry.child)]);
     while let Some((page, child)) = waiting.pop() {
         let (node, page) = match Child::unpack(child) {
@@ -40,9 +44,9 @@ fn below(scene: &Resident<'_>, entry: &Entry) -> Vec<(u32, u32)> {
                 found.push((page, child));
                 continue;
             }
-            Child::Inner(index) if page == DIRECTORY => (&scene.directory.nodes[index as usize], page),
-            Child::Inner(index) => (&scene.pages[page as usize].nodes[index as usize], page),
-            Child::Page(page) => (&scene.pages[page as usize].nodes[0], page),
+            Child::Inner(index) if page == DIRECTORY => (scene.directory.nodes[index as usize], page),
+            Child::Inner(index) => (node(page, index), page),
+            Child::Page(page) => (node(page, 0), page),
             Child::Unused => continue,
         };
         waiting.extend(node.children().map(|(_, child)| (page, child.pack())));
@@ -72,7 +76,8 @@ fn check_bundle(
     tally: &mut Tally,
 ) {
     let mut scratch = Scratch::new();
-    let Some(list) = scratch.clip(kernels, scene, rays, &mut Counts::default()) else {
+    let mut counts = Counts::default();
+    let Some(list) = scratch.clip(kernels, scene, rays, &mut counts) else {
         tally.incoherent += 1;
         return;
     };

@@ -148,7 +148,7 @@ fn nothing_is_a_scene_too() {
     let hit = nearest(Kernels::detect(), &pages.resident(), &ray, &mut Stack::new(), &mut Counts::default());
     assert!(!hit.candidate.is_hit());
     let what = "nothing, in bundles";
-    check_bundles(what, Kernels::detect(), &pages.resident(), 0.0, &[ray; 256], &[Candidate::none(1.0); 256], 256);
+    check_bundles(what, Kernels::detect(), &pages.resident(), &[ray; 256], &[Candidate::none(1.0); 256], 256);
 }
 
 /// One test a scene: they run side by side, and a failure names its scene.
