@@ -1,7 +1,7 @@
 //! The primitive tests against f64 and against their own laws.
 
 use hybray_geometry::simd::{Kernel, Kernels, Lanes, Simd};
-use hybray_geometry::{Aabb, Bundle, Candidate, Cone, Ray, RayKernel, Sphere, Triangle, Vec3, triangle_lanes};
+use hybray_geometry::{Aabb, Bundle, Candidate, Cone, LaneRay, Ray, RayKernel, Sphere, Triangle, Vec3, triangle_lanes};
 
 /// Numbers that depend on nothing but the seed.
 struct Random(u64);
@@ -255,4 +255,59 @@ fn an_unused_slot_is_never_met() {
         assert!(!(near <= far));
         assert!(!Bundle::around([r].iter(), 1.0).unwrap().meets_box(&Aabb::UNUSED));
     }
+}
+
+struct SideBySide<'a>(&'a [Ray]);
+
+impl Kernel for SideBySide<'_> {
+    type Output = Option<Vec<[f32; 13]>>;
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let rays = &self.0[..self.0.len().min(S::Packet::LANES)];
+        let lanes = LaneRay::side_by_side(simd.splat_packet(0.0), rays)?;
+        let values = [lanes.origin, lanes.direction, lanes.inverse, lanes.shear].concat();
+        let at = |value: S::Packet, lane: usize| value.to_array().as_ref()[lane];
+        let lane = |i: usize| std::array::from_fn(|k| at(*values.get(k).unwrap_or(&lanes.t_min), i));
+        assert_eq!(lanes.axes, RayKernel::new(&rays[0]).axes);
+        Some((0..S::Packet::LANES).map(lane).collect())
+    }
+}
+
+/// Rays side by side are to the bit what each is alone; those whose longest axes or signs differ are refused, and no others.
+#[test]
+fn rays_side_by_side_are_what_they_are_alone() {
+    let mut random = Random(5);
+    let (mut taken, mut refused) = (0, 0);
+    for round in 0..20_000 {
+        let (spread, towards) = ([0.0, 0.05, 1.0][round % 3], random.vec());
+        let coarse = |v: Vec3| if round % 7 == 0 { (v * 2.0).round() } else { v };
+        let rays: Vec<Ray> = (0..1 + random.bits() as usize % 16)
+            .map(|_| {
+                let direction = coarse(towards + random.vec() * spread);
+                let direction = if direction == Vec3::ZERO { Vec3::NEG_Z } else { direction };
+                Ray { origin: random.vec(), direction, t_min: random.signed().abs(), t_max: 1.0 }
+            })
+            .collect();
+        for kernels in Kernels::available() {
+            let found = kernels.run(SideBySide(&rays));
+            let lanes = if kernels.name() == "avx512" { 16 } else { 8 };
+            let alone: Vec<RayKernel> = rays.iter().take(lanes).map(RayKernel::new).collect();
+            assert_eq!(found.is_some(), alone.iter().all(|ray| ray.axes == alone[0].axes), "{kernels:?} {rays:?}");
+            let Some(found) = found else {
+                refused += 1;
+                continue;
+            };
+            assert_eq!(found.len(), lanes);
+            for (lane, found) in found.iter().enumerate() {
+                let ray = &alone[lane.min(alone.len() - 1)];
+                let expected = [&ray.origin[..], &ray.direction, &ray.inverse, &ray.shear, &[ray.t_min]].concat();
+                assert_eq!(
+                    found.map(f32::to_bits)[..],
+                    expected.iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
+                    "{ray:?}"
+                );
+            }
+            taken += 1;
+        }
+    }
+    assert!(taken > 5_000 && refused > 5_000, "{taken} {refused}");
 }

@@ -1,8 +1,8 @@
-//! Shadow rays as bundles: a pyramid from a light towards a group of hits, or from a hit towards an area light (the 1995
-//! report, chapter 4; DESIGN section 14).
+//! Shadow rays as bundles: those of a group of hits towards a light, or of a hit towards an area light (the 1995 report,
+//! chapter 4; DESIGN section 14).
 //!
-//! The planes of a bundle only leave out boxes. What is tested are the rays that each hit sends, from their own origins, so
-//! that the answer is that of a single walk, whatever goes along in the bundle.
+//! A bundle only leaves out boxes. What is tested are the rays that each hit sends, from their own origins, so that the
+//! answer is that of a single walk, whatever goes along in the bundle. What blocked one packet is tried first for the next.
 
 use crate::packet::Packet;
 use crate::wide::{Scratch, clip};
@@ -18,8 +18,7 @@ pub const RAYS_MAX: usize = 64;
 /// bit that of a single walk. Where a ray needs a page that is not at hand, `needs` names one of those, not always the first;
 /// the ray is to be walked singly from the beginning then. With `ANY`, what is hit in a page at hand needs none.
 ///
-/// Rays that stand together in the slice should be neighbours: it is divided into halves where a bundle does not pay.
-/// Bounded by the single walks of all rays, and as many clips.
+/// Rays that stand together in the slice should be neighbours. Bounded by the single walks of all rays, and one clip.
 ///
 /// # Panics
 /// If there are more rays than [`RAYS_MAX`], or fewer places than rays.

@@ -47,7 +47,7 @@ pub(crate) struct List {
     pub pages: [[u32; WIDTH]; LIST_MAX / WIDTH],
 }
 
-/// What tracing a bundle needs: lent by the caller. About 12 KB.
+/// What tracing a bundle needs: lent by the caller. About 9 KB.
 #[derive(Clone, Debug)]
 pub struct Scratch {
     entries: [Entry; LIST_MAX],

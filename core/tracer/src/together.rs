@@ -21,7 +21,7 @@ pub const TOGETHER: usize = shadow::RAYS_MAX;
 /// goes with the first of the others, and so on.
 const SAMPLES_MIN: u32 = 8;
 
-/// What a bundle of shadow rays needs: lent by the caller. About 15 KB.
+/// What a bundle of shadow rays needs: lent by the caller. About 14 KB.
 #[derive(Clone, Debug)]
 pub struct Together {
     rays: [Ray; TOGETHER],
