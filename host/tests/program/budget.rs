@@ -199,6 +199,33 @@ fn errors_name_what_would_do() {
     assert!(said.contains("packed with --page-bytes"), "{said}");
 }
 
+/// Full pages if they fit; compact ones if they do not, unless somebody says otherwise; and one picture.
+#[test]
+fn pages_are_compact_where_full_ones_do_not_fit() {
+    let folder = Folder::new();
+    let scene = "terrain:20000 --nodes 2 --page-bytes 16384";
+    let plan = |more: &str| json(&folder, &format!("plan {scene} {more}"));
+    let [full, compact] = ["full", "compact"].map(|form| {
+        let r = plan(&format!("--memory 64MiB --pages {form}"));
+        assert_eq!(whole(&r, "/compact_pages"), if form == "full" { 0 } else { whole(&r, "/pages") });
+        whole(&r, "/least_memory") / 1024
+    });
+    assert!(compact < full - full / 4, "{compact} {full}");
+    assert_eq!(whole(&plan(&format!("--memory {full}KiB")), "/compact_pages"), 0);
+    for memory in [compact, full - 1] {
+        let r = plan(&format!("--memory {memory}KiB"));
+        assert_eq!(whole(&r, "/compact_pages"), whole(&r, "/pages"), "{memory}");
+    }
+    let too_little = folder.run(&format!("plan {scene} --memory {}KiB --pages full", full - 1));
+    assert_eq!(too_little.status.code(), Some(1));
+    let film =
+        |more: &str| json(&folder, &format!("render {scene} --size 48x36 --spp 1 -q -o a.png {more}"))["film"].clone();
+    let expected = film("");
+    for more in [format!("--memory {}KiB", full - 1), format!("--memory {full}KiB"), "--pages compact".to_owned()] {
+        assert_eq!(film(&more), expected, "{more}");
+    }
+}
+
 #[test]
 fn settings_of_budgets_want_one() {
     let folder = Folder::new();
