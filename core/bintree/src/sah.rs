@@ -43,6 +43,31 @@ pub const fn nodes_for(items: usize) -> usize {
 /// # Panics
 /// If there are items, and `nodes` is empty.
 pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) -> usize {
+    build_with(items, nodes, settings, &OneThread)
+}
+
+/// What a split asks of all items of a range. Whoever has several threads gives them parts of the range, and joins what they
+/// find in the order of the parts: then the tree is the same however many there are.
+pub trait Scan {
+    /// [`Extents::of`] the items.
+    fn extents(&self, items: &[Item]) -> Extents {
+        Extents::of(items)
+    }
+    /// [`Bins::of`] the items.
+    fn bins(&self, items: &[Item], binning: &Binning) -> Bins {
+        Bins::of(items, binning)
+    }
+}
+
+struct OneThread;
+
+impl Scan for OneThread {}
+
+/// [`build`], with somebody else to look through the items.
+///
+/// # Panics
+/// If there are items, and `nodes` is empty.
+pub fn build_with(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings, scan: &impl Scan) -> usize {
     if items.is_empty() {
         return 0;
     }
@@ -59,13 +84,13 @@ pub fn build(items: &mut [Item], nodes: &mut [BinaryNode], settings: &Settings) 
         // Down the first children, leaving the second ones on the stack: one entry a level.
         loop {
             let range = &mut items[part.first as usize..][..part.count as usize];
-            let (boxes, centroids) = extents(range);
+            let extents = scan.extents(range);
             let here = used;
-            nodes[here] = BinaryNode { aabb: boxes.aabb(), first: part.first, count: part.count, second: 0 };
+            nodes[here] = BinaryNode { aabb: extents.boxes.aabb(), first: part.first, count: part.count, second: 0 };
             used += 1;
             // Each part that waits will take a node.
             let room = used + waiting + 2 <= nodes.len();
-            let Some(left) = room.then(|| split(range, &boxes, &centroids, part.depth, settings)).flatten() else {
+            let Some(left) = room.then(|| split(range, &extents, part.depth, settings, scan)).flatten() else {
                 range.sort_unstable_by_key(|item| (item.kind, item.id));
                 break;
             };
@@ -116,18 +141,66 @@ impl Quad {
     }
 }
 
-/// The box around `items`, and the box around their centroids.
-fn extents(items: &[Item]) -> (Quad, Quad) {
-    items.iter().fold((Quad::EMPTY, Quad::EMPTY), |(boxes, centroids), item| {
-        let c = centroid(item);
-        (boxes.union(&Quad::of(item.lo, item.hi)), centroids.union(&Quad::of(c, c)))
-    })
+/// The box around items, and the box around their centroids.
+#[derive(Clone, Copy)]
+pub struct Extents {
+    boxes: Quad,
+    centroids: Quad,
+}
+
+impl Extents {
+    /// Those of `items`.
+    #[must_use]
+    pub fn of(items: &[Item]) -> Self {
+        let none = Self { boxes: Quad::EMPTY, centroids: Quad::EMPTY };
+        items.iter().fold(none, |all, item| {
+            let c = centroid(item);
+            all.and(&Self { boxes: Quad::of(item.lo, item.hi), centroids: Quad::of(c, c) })
+        })
+    }
+
+    /// Those of two parts, of which `after` comes after this one.
+    #[must_use]
+    #[inline(always)]
+    pub fn and(&self, after: &Self) -> Self {
+        Self { boxes: self.boxes.union(&after.boxes), centroids: self.centroids.union(&after.centroids) }
+    }
 }
 
 #[derive(Clone, Copy)]
 struct Bin {
     aabb: Quad,
     count: u32,
+}
+
+/// Items by their place along each axis: 7 KB.
+#[derive(Clone)]
+pub struct Bins([[Bin; BINS]; 3]);
+
+impl Bins {
+    /// Those of `items`.
+    #[must_use]
+    pub fn of(items: &[Item], binning: &Binning) -> Self {
+        let mut bins = [[EMPTY; BINS]; 3];
+        for item in items {
+            let aabb = Quad::of(item.lo, item.hi);
+            for (axis, bin) in binning.bins(item).into_iter().enumerate() {
+                let bin = &mut bins[axis][bin];
+                bin.aabb = bin.aabb.union(&aabb);
+                bin.count += 1;
+            }
+        }
+        Self(bins)
+    }
+
+    /// Those of two parts, of which `after` comes after this one.
+    #[must_use]
+    pub fn and(mut self, after: &Self) -> Self {
+        for (bin, after) in self.0.as_flattened_mut().iter_mut().zip(after.0.as_flattened()) {
+            *bin = merged(bin, after);
+        }
+        self
+    }
 }
 
 const EMPTY: Bin = Bin { aabb: Quad::EMPTY, count: 0 };
@@ -140,7 +213,7 @@ struct Plane {
 }
 
 /// Which bin a centroid falls into: monotone, so that a plane between bins is a plane in space.
-struct Binning {
+pub struct Binning {
     lo: Vec3,
     scale: Vec3,
     /// How many there are.
@@ -181,7 +254,7 @@ fn blocks(count: u32) -> f32 {
 }
 
 /// Reorders `items` so that the first child's come first, and returns how many those are; `None` for a leaf.
-fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings: &Settings) -> Option<usize> {
+fn split(items: &mut [Item], extents: &Extents, depth: u32, settings: &Settings, scan: &impl Scan) -> Option<usize> {
     let count = items.len() as u32;
     // Fewer than a block cost as much as a block: they are divided only where that would leave most of them out, and
     // then the boxes above them are small already.
@@ -192,10 +265,10 @@ fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings
     if depth + (32 - count.leading_zeros()) >= BINARY_DEPTH_MAX {
         return Some(items.len() / 2);
     }
-    let binning = Binning::new(centroids, count);
-    let plane = best_plane(items, &binning);
+    let binning = Binning::new(&extents.centroids, count);
+    let plane = best_plane(&scan.bins(items, &binning), &binning, count);
     let leaf_cost = blocks(count);
-    let area = aabb.half_area();
+    let area = extents.boxes.half_area();
     match plane {
         Some(plane) => {
             let cost = settings.node_cost + plane.cost / if area > 0.0 { area } else { f32::MIN_POSITIVE };
@@ -209,17 +282,8 @@ fn split(items: &mut [Item], aabb: &Quad, centroids: &Quad, depth: u32, settings
     }
 }
 
-fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
-    let mut bins = [[EMPTY; BINS]; 3];
+fn best_plane(Bins(bins): &Bins, binning: &Binning, count: u32) -> Option<Plane> {
     let used = binning.bins;
-    for item in items {
-        let aabb = Quad::of(item.lo, item.hi);
-        for (axis, bin) in binning.bins(item).into_iter().enumerate() {
-            let bin = &mut bins[axis][bin];
-            bin.aabb = bin.aabb.union(&aabb);
-            bin.count += 1;
-        }
-    }
     let mut best: Option<Plane> = None;
     for (axis, bins) in bins.iter().enumerate() {
         let mut above = [0.0; BINS];
@@ -232,7 +296,7 @@ fn best_plane(items: &[Item], binning: &Binning) -> Option<Plane> {
         for bin in 1..used {
             sum = merged(&sum, &bins[bin - 1]);
             let cost = sum.aabb.half_area() * blocks(sum.count) + above[bin];
-            let separates = sum.count > 0 && sum.count < items.len() as u32;
+            let separates = sum.count > 0 && sum.count < count;
             if separates && best.as_ref().is_none_or(|b| cost < b.cost) {
                 best = Some(Plane { axis, bin, cost });
             }

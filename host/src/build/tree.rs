@@ -5,6 +5,7 @@ use super::{Rule, Settings};
 use bytemuck::allocation::zeroed_box;
 use hybray_bintree::cut::{self, Cut, CutError, Primitives};
 use hybray_bintree::reinsert::Link;
+use hybray_bintree::sah::{Binning, Bins, Extents};
 use hybray_bintree::{BinaryNode, Forest, Item, midpoint, reinsert, sah};
 use hybray_geometry::Aabb;
 use hybray_scene::{Line, PageView};
@@ -66,7 +67,7 @@ fn surface_area<P: Primitives + Sync>(
     // Splits may cut off little at a time: where this room ends, a chunk is larger, and nothing else changes.
     let chunks = items.len() / CHUNK as usize;
     let mut tops = vec![BinaryNode::EMPTY; if chunks == 0 { 1 } else { 4096 + 64 * chunks }];
-    let used = sah::build(items, &mut tops, &stop_at);
+    let used = sah::build_with(items, &mut tops, &stop_at, &ByThreads);
     tops.truncate(used);
 
     let mut rest = items;
@@ -89,6 +90,25 @@ fn surface_area<P: Primitives + Sync>(
         )
         .collect::<Result<_, _>>()?;
     Ok(VoxelTree { tops, chunks })
+}
+
+/// Items that are worth the way to another thread.
+const SHARE: usize = 1 << 14;
+
+/// All threads look through a range together, a share each. Boxes are least and greatest of what is there, and counts are
+/// sums: joined in order, they are the same whatever the shares.
+struct ByThreads;
+
+impl sah::Scan for ByThreads {
+    fn extents(&self, items: &[Item]) -> Extents {
+        let parts = items.par_chunks(SHARE).map(Extents::of);
+        parts.reduce_with(|a, b| a.and(&b)).unwrap_or_else(|| Extents::of(&[]))
+    }
+
+    fn bins(&self, items: &[Item], binning: &Binning) -> Bins {
+        let parts = items.par_chunks(SHARE).map(|part| Bins::of(part, binning));
+        parts.reduce_with(|a, b| a.and(&b)).unwrap_or_else(|| Bins::of(&[], binning))
+    }
 }
 
 /// A whole tree over `items` in `nodes`, and how many it took. Leaves are mostly full, so that half a node an item is nearly
@@ -165,4 +185,59 @@ fn cut_chunk<P: Primitives>(
         },
     )?;
     Ok(chunk)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::{Source, build};
+    use crate::import;
+
+    fn items(name: &str) -> Vec<Item> {
+        let model = import::load(name).unwrap();
+        let (source, _) = Source::new(&model).unwrap();
+        let item = |id| {
+            let (kind, aabb) = source.aabb(id);
+            Item::new(&aabb, kind, id)
+        };
+        (0..source.len()).map(item).collect()
+    }
+
+    #[test]
+    fn the_same_pages_whatever_the_threads() {
+        for name in ["terrain:150000", "spd:balls:5", "spd:teapot:30"] {
+            let model = import::load(name).unwrap();
+            let built = [1, 2, 3, 8].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| build(&model, &Settings::default()).unwrap())
+            });
+            let [one, others @ ..] = &built;
+            assert!(one.pages() > 10, "{name}: {}", one.pages());
+            for other in others {
+                assert!(one.page_slices() == other.page_slices() && one.hash() == other.hash(), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn shares_find_what_one_thread_finds() {
+        let mut all = items("terrain:150000");
+        // Zeros of both signs are equal, and must not take turns.
+        for (i, item) in all.iter_mut().enumerate() {
+            item.lo.x = if i % 3 == 0 { -0.0 } else { 0.0 };
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let settings = sah::Settings { stop_at: 1000, ..sah::Settings::default() };
+        let nodes = vec![BinaryNode::EMPTY; sah::nodes_for(all.len())];
+        let [mut a, mut b] = [(all.clone(), nodes.clone()), (all, nodes)];
+        let used = sah::build(&mut a.0, &mut a.1, &settings);
+        assert_eq!(pool.install(|| sah::build_with(&mut b.0, &mut b.1, &settings, &ByThreads)), used);
+        let bits = |(items, nodes): &(Vec<Item>, Vec<BinaryNode>)| {
+            let corners = nodes[..used].iter().flat_map(|n| [n.aabb.lo, n.aabb.hi]);
+            let corners: Vec<_> = corners.flat_map(|c| c.to_array().map(f32::to_bits)).collect();
+            let ids: Vec<_> = items.iter().map(|item| item.id).collect();
+            (corners, ids, nodes[..used].iter().map(|n| (n.first, n.count, n.second)).collect::<Vec<_>>())
+        };
+        assert!(bits(&a) == bits(&b));
+    }
 }
