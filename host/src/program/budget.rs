@@ -102,7 +102,7 @@ impl Farm<'_> {
         let scene = prepared.scene(&opened);
         let (pages, voxels) = (prepared.packed.placed_pages(), prepared.packed.voxels());
         let fit = self.wanted(&scene).fit_picture(&pages, voxels, &scene, self.light_cache, None);
-        Ok(!matches!(fit, Err(NoFit::Misfit(_) | NoFit::Plan(PlanError::Memory { .. }))))
+        Ok(matches!(fit, Ok(_) | Err(NoFit::Plan(PlanError::LightCache { .. }))))
     }
 
     /// Which nodes are given no tiles: entry 0 is the host's.
