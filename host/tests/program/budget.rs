@@ -164,8 +164,8 @@ fn errors_name_what_would_do() {
         ("spd:balls:3", 2, "1"),
         ("spd:balls:3", 2, "64KiB"),
         ("terrain:20000", 2, "256KiB"),
-        ("terrain:20000", 2, "512KiB --scheduler data-parallel"),
-        ("terrain:20000", 4, "300000 --page-bytes 16384"),
+        ("terrain:20000", 2, "300KiB --scheduler data-parallel"),
+        ("terrain:20000", 4, "200000 --page-bytes 16384"),
         ("t.hyb", 3, "384KiB"),
     ] {
         for verb in ["render -o a.png --size 24x16 --spp 1", "plan"] {
