@@ -314,11 +314,11 @@ pub const MACHINES: [Machine; 6] = [
 
 /// How many thousandths of a desktop core's time a PowerPC 601 at 80 MHz takes, its compiler and program of 1995
 /// included.
-const FITTED_POWERXPLORER: u64 = 2_755_200;
+const FITTED_POWERXPLORER: u64 = 2_943_900;
 /// The same for a PowerPC 604 at 133 MHz with POV-Ray 3.
-const FITTED_CC48: u64 = 2_563_500;
+const FITTED_CC48: u64 = 2_769_900;
 /// The same for a small board.
-const FITTED_BOARD: u64 = 335_800;
+const FITTED_BOARD: u64 = 359_100;
 
 #[cfg(test)]
 mod tests {
