@@ -73,19 +73,22 @@ pub struct Stack {
 }
 
 /// A subtree that waits: the distance at which the ray enters it, above its packed child. Distances are not negative, so that
-/// the nearer is the smaller number.
+/// the nearer is the smaller number; for any hit the farther, since a ray to a light begins on a surface, much of which is
+/// near, and seldom blocks it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Waiting(u64);
 
 impl Waiting {
     #[inline(always)]
-    fn new(near: f32, child: u32) -> Self {
-        Self(u64::from(near.to_bits()) << 32 | u64::from(child))
+    fn new<const ANY: bool>(near: f32, child: u32) -> Self {
+        let key = if ANY { !near.to_bits() } else { near.to_bits() };
+        Self(u64::from(key) << 32 | u64::from(child))
     }
 
     #[inline(always)]
-    fn near(self) -> f32 {
-        f32::from_bits((self.0 >> 32) as u32)
+    fn near<const ANY: bool>(self) -> f32 {
+        let key = (self.0 >> 32) as u32;
+        f32::from_bits(if ANY { !key } else { key })
     }
 
     #[inline(always)]
@@ -232,19 +235,19 @@ impl<S: Simd> Walker<S> {
             return None;
         }
         let (mut needs, mut last) = (None, f32::NEG_INFINITY);
-        waiting[0] = Waiting::new(self.kernel.t_min, Child::Inner(0).pack());
+        waiting[0] = Waiting::new::<ANY>(self.kernel.t_min, Child::Inner(0).pack());
         let mut top = 1;
         if from != FROM_ROOT {
-            (self.counts.nodes, top) = self.descend(scene, from, waiting);
+            (self.counts.nodes, top) = self.descend::<ANY, P>(scene, from, waiting);
         }
         while top > 0 {
             top -= 1;
             let next = waiting[top];
-            if next.near() > self.best.candidate.t {
+            if next.near::<ANY>() > self.best.candidate.t {
                 continue;
             }
             match Child::unpack(next.child()) {
-                Child::Inner(index) => top = self.node(&scene.directory.nodes[index as usize], waiting, top),
+                Child::Inner(index) => top = self.node::<ANY>(&scene.directory.nodes[index as usize], waiting, top),
                 Child::Page(page) => {
                     let view = if ANY { scene.pages.page(page) } else { scene.pages.nearest(page) };
                     let Some(view) = view else {
@@ -279,7 +282,7 @@ impl<S: Simd> Walker<S> {
     /// root, what a node's walk would have met before the child that leads to the page is left out, and the rest waits.
     /// Bounded: the directory's depth. By value, so that the walk can stay in registers.
     #[inline(never)]
-    fn descend<P: Pages + ?Sized>(
+    fn descend<const ANY: bool, P: Pages + ?Sized>(
         mut self,
         scene: &Resident<'_, P>,
         page: u32,
@@ -301,7 +304,7 @@ impl<S: Simd> Walker<S> {
         for &parent in path[..levels].iter().rev() {
             let node = &nodes[parent as usize / WIDTH];
             let child = node.child[parent as usize % WIDTH];
-            let end = self.node(node, waiting, top);
+            let end = self.node::<ANY>(node, waiting, top);
             // If the child is not among those met, the best hit lies before it, and before all that come after it.
             let Some(at) = (top..end).find(|&at| waiting[at].child() == child) else { return (self.counts.nodes, top) };
             top = at;
@@ -326,7 +329,7 @@ impl<S: Simd> Walker<S> {
         loop {
             let kind = Child::unpack(child);
             if let Child::Inner(index) = kind {
-                if let Some(next) = self.step(body.node(index as usize, &mut room), waiting, &mut top) {
+                if let Some(next) = self.step::<ANY>(body.node(index as usize, &mut room), waiting, &mut top) {
                     child = next.child();
                     continue;
                 }
@@ -342,7 +345,7 @@ impl<S: Simd> Walker<S> {
                 }
                 top -= 1;
                 let next = waiting[top];
-                if next.near() <= self.best.candidate.t {
+                if next.near::<ANY>() <= self.best.candidate.t {
                     child = next.child();
                     break;
                 }
@@ -350,19 +353,25 @@ impl<S: Simd> Walker<S> {
         }
     }
 
-    /// Pushes the children of a node that the ray enters before its best hit, the nearest last; returns the new top.
+    /// Pushes the children of a node that the ray enters before its best hit, the first last; returns the new top.
     #[inline(always)]
-    fn node(&mut self, node: &Node, waiting: &mut [Waiting; STACK], mut top: usize) -> usize {
-        if let Some(next) = self.step(node, waiting, &mut top) {
+    fn node<const ANY: bool>(&mut self, node: &Node, waiting: &mut [Waiting; STACK], mut top: usize) -> usize {
+        if let Some(next) = self.step::<ANY>(node, waiting, &mut top) {
             waiting[top] = next;
             top += 1;
         }
         top
     }
 
-    /// The nearest of a node's children that the ray enters before its best hit; the others are pushed, the nearest last.
+    /// The first of a node's children that the ray enters before its best hit; the others are pushed, the next last. First is
+    /// the nearest, for any hit the farthest.
     #[inline(always)]
-    fn step(&mut self, node: &Node, waiting: &mut [Waiting; STACK], top: &mut usize) -> Option<Waiting> {
+    fn step<const ANY: bool>(
+        &mut self,
+        node: &Node,
+        waiting: &mut [Waiting; STACK],
+        top: &mut usize,
+    ) -> Option<Waiting> {
         self.counts.nodes += 1;
         let (b, simd, rows) = (&self.boxes, self.simd, node.rows());
         let [x0, y0, z0] = b.near;
@@ -383,7 +392,7 @@ impl<S: Simd> Walker<S> {
         let mut take = || {
             let slot = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
-            (Waiting::new(near[slot], node.child[slot]), met != 0)
+            (Waiting::new::<ANY>(near[slot], node.child[slot]), met != 0)
         };
         // Most nodes are left with one to three children.
         let (first, more) = take();
@@ -391,16 +400,16 @@ impl<S: Simd> Walker<S> {
             return Some(first);
         }
         let (second, mut more) = take();
-        let (mut nearest, farther) = if second < first { (second, first) } else { (first, second) };
+        let (mut first, later) = if second < first { (second, first) } else { (first, second) };
         let base = *top;
         let mut end = base;
-        waiting[end] = farther;
+        waiting[end] = later;
         end += 1;
         while more {
             let mut next;
             (next, more) = take();
-            if next < nearest {
-                core::mem::swap(&mut next, &mut nearest);
+            if next < first {
+                core::mem::swap(&mut next, &mut first);
             }
             let mut at = end;
             while at > base && waiting[at - 1] < next {
@@ -411,7 +420,7 @@ impl<S: Simd> Walker<S> {
             end += 1;
         }
         *top = end;
-        Some(nearest)
+        Some(first)
     }
 
     #[inline(always)]

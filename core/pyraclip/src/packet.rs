@@ -5,7 +5,7 @@ use crate::wide::{DIRECTORY, Entry, List};
 use hybray_bintree::walk::{Counts, Hit, Resident, STACK};
 use hybray_geometry::simd::{Lanes, Mask, Simd};
 use hybray_geometry::{Aabb, Candidate, LaneRay, Ray, RayKernel, sphere_lanes, triangle_lanes};
-use hybray_scene::{BLOCK, Child, Form, Kind, Node, PageView, Pages, Slot, TriangleBlock, WIDTH};
+use hybray_scene::{BLOCK, Body, Child, Form, Kind, Node, PageView, Pages, Slot, TriangleBlock, WIDTH};
 
 /// Lanes of a packet at most.
 pub(crate) const LANES_MAX: usize = 16;
@@ -124,11 +124,11 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
             if met != 0 {
                 match (Child::unpack(node.child[slot]), &view) {
                     (Child::Inner(index), _) if page == DIRECTORY => {
-                        top = self.open(&scene.directory.nodes[index as usize], index, page, waiting, top);
+                        top = self.open(None, &scene.directory.nodes[index as usize], index, page, waiting, top);
                     }
                     (Child::Inner(index), Some(view)) => {
                         let node = view.body.node(index as usize, &mut below_room);
-                        top = self.open(node, index, page, waiting, top);
+                        top = self.open(Some(&view.body), node, index, page, waiting, top);
                     }
                     (Child::Leaf { kind, start, count }, Some(view)) => {
                         let place = (page, kind, start as usize, count as usize);
@@ -140,7 +140,14 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
                     (Child::Page(below), _) => {
                         if let Some(found) = scene.pages.page(below) {
                             self.counts.pages += 1;
-                            top = self.open(found.body.node(0, &mut below_room), 0, below, waiting, top);
+                            top = self.open(
+                                Some(&found.body),
+                                found.body.node(0, &mut below_room),
+                                0,
+                                below,
+                                waiting,
+                                top,
+                            );
                             (page, view) = (below, Some(found));
                         } else {
                             self.miss(below, met, near);
@@ -171,15 +178,27 @@ impl<'r, S: Simd, const ANY: bool> Packet<'r, S, ANY> {
         }
     }
 
-    /// Puts the children of a node that the packet may meet on the stack, the nearest last; returns the new top.
+    /// Puts the children of a node, of a page unless of the directory, that the packet may meet on the stack, the first last; returns
+    /// the new top. What they lead to is on its way into the cache meanwhile: among millions of triangles, a walk waits for memory.
     #[inline(always)]
-    fn open(&mut self, node: &Node, index: u32, page: u32, waiting: &mut [Waiting; STACK], top: usize) -> usize {
+    fn open(
+        &mut self,
+        body: Option<&Body<'_>>,
+        node: &Node,
+        index: u32,
+        page: u32,
+        waiting: &mut [Waiting; STACK],
+        top: usize,
+    ) -> usize {
         self.counts.nodes += 1;
         let (mut met, near) = self.span.meets(self.simd, &node.lo, &node.hi, self.stop);
         let mut end = top;
         while met != 0 {
             let slot = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
+            if let Some(body) = body {
+                body.fetch(self.simd, Child::unpack(node.child[slot]));
+            }
             let entry = (near[slot], index * WIDTH as u32 + slot as u32, page);
             let mut at = end;
             while at > top && if ANY { waiting[at - 1].0 > entry.0 } else { waiting[at - 1].0 < entry.0 } {

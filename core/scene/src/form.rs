@@ -5,8 +5,9 @@
 //! triangles share their vertices, which are those of the full form to the bit: so are the hits.
 
 use crate::node::{START_BITS, TAG_LEAF, TAG_UNUSED};
-use crate::{BLOCK, Child, Node, TriangleBlock, WIDTH};
+use crate::{BLOCK, Child, Kind, Node, TriangleBlock, WIDTH};
 use bytemuck::{Pod, Zeroable};
+use hybray_geometry::simd::Simd;
 use hybray_geometry::{Triangle, Vec3};
 
 /// Which form a page has. Its hits do not depend on it.
@@ -30,6 +31,22 @@ pub trait Form<'a> {
     fn triangles<'n>(&self, index: usize, room: &'n mut TriangleBlock) -> &'n TriangleBlock
     where
         'a: 'n;
+    /// Says that a node or a leaf's triangles will be wanted soon.
+    fn fetch<S: Simd>(&self, simd: S, child: Child);
+}
+
+/// Says that the node, or the triangles, that `child` tells of will be wanted soon.
+#[inline(always)]
+fn fetch<S: Simd, N, T>(simd: S, child: Child, nodes: &[N], triangles: &[T]) {
+    match child {
+        Child::Inner(index) => simd.fetch(&nodes[index as usize]),
+        Child::Leaf { kind: Kind::Triangle, start, count } => {
+            for block in &triangles[start as usize..][..count as usize] {
+                simd.fetch(block);
+            }
+        }
+        Child::Leaf { .. } | Child::Page(_) | Child::Unused => {}
+    }
 }
 
 /// The full form.
@@ -72,6 +89,11 @@ impl<'a> Form<'a> for Full<'a> {
     {
         &self.triangles[index]
     }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, simd: S, child: Child) {
+        fetch(simd, child, self.nodes, self.triangles);
+    }
 }
 
 impl<'a> Form<'a> for Compact<'a> {
@@ -99,6 +121,11 @@ impl<'a> Form<'a> for Compact<'a> {
             }
         }
         room
+    }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, simd: S, child: Child) {
+        fetch(simd, child, self.nodes, self.triangles);
     }
 }
 
@@ -287,6 +314,14 @@ impl<'a> Form<'a> for Body<'a> {
         match self {
             Self::Full(page) => page.triangles(index, room),
             Self::Compact(page) => page.triangles(index, room),
+        }
+    }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, simd: S, child: Child) {
+        match self {
+            Self::Full(page) => page.fetch(simd, child),
+            Self::Compact(page) => page.fetch(simd, child),
         }
     }
 }

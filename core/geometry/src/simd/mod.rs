@@ -89,6 +89,11 @@ pub trait Simd: Copy {
     fn splat8(self, x: f32) -> Self::F8;
     /// `x` in every lane of a packet.
     fn splat_packet(self, x: f32) -> Self::Packet;
+    /// Says that `at` will be read soon: where the instruction set has a hint for that.
+    #[inline(always)]
+    fn fetch<T>(self, at: &T) {
+        let _ = at;
+    }
     /// Runs `kernel` compiled for this instruction set.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
     /// Four lanes from memory.

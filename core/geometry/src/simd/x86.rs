@@ -39,6 +39,14 @@ impl Simd for Avx2 {
         X8(unsafe { _mm256_set1_ps(x) })
     }
     #[inline(always)]
+    fn fetch<T>(self, at: &T) {
+        let at: *const T = at;
+        for line in 0..size_of::<T>().div_ceil(64) {
+            // SAFETY: a hint reads nothing.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(at.cast::<i8>().wrapping_add(64 * line)) }
+        }
+    }
+    #[inline(always)]
     fn splat_packet(self, x: f32) -> X8 {
         self.splat8(x)
     }
@@ -83,6 +91,10 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn splat8(self, x: f32) -> X8 {
         self.0.splat8(x)
+    }
+    #[inline(always)]
+    fn fetch<T>(self, at: &T) {
+        self.0.fetch(at);
     }
     #[inline(always)]
     fn splat_packet(self, x: f32) -> X16 {
