@@ -73,22 +73,21 @@ pub struct Stack {
 }
 
 /// A subtree that waits: the distance at which the ray enters it, above its packed child. Distances are not negative, so that
-/// the nearer is the smaller number; for any hit the farther, since a ray to a light begins on a surface, much of which is
-/// near, and seldom blocks it.
+/// the nearer is the smaller number; the farther, where that goes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Waiting(u64);
 
 impl Waiting {
     #[inline(always)]
-    fn new<const ANY: bool>(near: f32, child: u32) -> Self {
-        let key = if ANY { !near.to_bits() } else { near.to_bits() };
+    fn new(near: f32, child: u32, far_first: bool) -> Self {
+        let key = if far_first { !near.to_bits() } else { near.to_bits() };
         Self(u64::from(key) << 32 | u64::from(child))
     }
 
     #[inline(always)]
-    fn near<const ANY: bool>(self) -> f32 {
+    fn near(self, far_first: bool) -> f32 {
         let key = (self.0 >> 32) as u32;
-        f32::from_bits(if ANY { !key } else { key })
+        f32::from_bits(if far_first { !key } else { key })
     }
 
     #[inline(always)]
@@ -125,8 +124,8 @@ pub fn occluded(kernels: Kernels, scene: &Resident<'_>, ray: &Ray, stack: &mut S
 
 /// A walk as a kernel: from the root, or on from a page, as far as the pages at hand go.
 ///
-/// The order in which a walk meets pages is a function of the ray and the directory alone: a walk that goes on from page P
-/// looks at P and at what comes after it, and never at what came before. So a ray that is handed from node to node, each
+/// The order in which a walk meets pages is a function of the ray and the directory alone, unless it has them all: a walk that goes on
+/// from page P looks at P and at what comes after it, and never at what came before. So a ray that is handed from node to node, each
 /// of which walks the pages that it has, tests the same pages as one that finds all of them in one place, or fewer.
 ///
 /// A walk ends at the first page that is not at hand. One for any hit (`ANY`) from the root may go `past` such pages: whatever
@@ -177,7 +176,13 @@ impl<const ANY: bool, P: Pages + ?Sized> Kernel for Walk<'_, '_, ANY, P> {
         let kernel = RayKernel::new(self.ray);
         let mut walker =
             Walker::<S> { simd, boxes: BoxRay::new(simd, &kernel), kernel, best: self.best, counts: Counts::default() };
-        let needs = walker.directory::<ANY, P>(self.scene, self.from, self.past, self.stack);
+        // A ray to a light begins on a surface, much of which is near, and seldom blocks it: what is far ends it sooner. But
+        // where not all pages are at hand, the near ones are, and a walk that goes on keeps the order in which it began.
+        let needs = if ANY && P::ALL && self.from == FROM_ROOT {
+            walker.directory::<ANY, P>(self.scene, self.from, self.past, self.stack, true)
+        } else {
+            walker.directory::<ANY, P>(self.scene, self.from, self.past, self.stack, false)
+        };
         *self.counts += walker.counts;
         Walked { best: walker.best, needs }
     }
@@ -229,25 +234,28 @@ impl<S: Simd> Walker<S> {
         from: u32,
         past: bool,
         stack: &mut Stack,
+        far_first: bool,
     ) -> Option<u32> {
         let waiting = &mut stack.waiting;
         if scene.directory.nodes.is_empty() {
             return None;
         }
         let (mut needs, mut last) = (None, f32::NEG_INFINITY);
-        waiting[0] = Waiting::new::<ANY>(self.kernel.t_min, Child::Inner(0).pack());
+        waiting[0] = Waiting::new(self.kernel.t_min, Child::Inner(0).pack(), far_first);
         let mut top = 1;
         if from != FROM_ROOT {
-            (self.counts.nodes, top) = self.descend::<ANY, P>(scene, from, waiting);
+            (self.counts.nodes, top) = self.descend(scene, from, waiting, far_first);
         }
         while top > 0 {
             top -= 1;
             let next = waiting[top];
-            if next.near::<ANY>() > self.best.candidate.t {
+            if next.near(far_first) > self.best.candidate.t {
                 continue;
             }
             match Child::unpack(next.child()) {
-                Child::Inner(index) => top = self.node::<ANY>(&scene.directory.nodes[index as usize], waiting, top),
+                Child::Inner(index) => {
+                    top = self.node(&scene.directory.nodes[index as usize], waiting, top, far_first);
+                }
                 Child::Page(page) => {
                     let view = if ANY { scene.pages.page(page) } else { scene.pages.nearest(page) };
                     let Some(view) = view else {
@@ -262,8 +270,8 @@ impl<S: Simd> Walker<S> {
                     };
                     self.counts.pages += 1;
                     match &view.body {
-                        Body::Full(body) => self.page::<ANY>(page, &view, body, waiting, top),
-                        Body::Compact(body) => self.page::<ANY>(page, &view, body, waiting, top),
+                        Body::Full(body) => self.page::<ANY>(page, &view, body, waiting, top, far_first),
+                        Body::Compact(body) => self.page::<ANY>(page, &view, body, waiting, top, far_first),
                     }
                     if ANY && self.best.candidate.is_hit() {
                         return None;
@@ -282,11 +290,12 @@ impl<S: Simd> Walker<S> {
     /// root, what a node's walk would have met before the child that leads to the page is left out, and the rest waits.
     /// Bounded: the directory's depth. By value, so that the walk can stay in registers.
     #[inline(never)]
-    fn descend<const ANY: bool, P: Pages + ?Sized>(
+    fn descend<P: Pages + ?Sized>(
         mut self,
         scene: &Resident<'_, P>,
         page: u32,
         waiting: &mut [Waiting; STACK],
+        far_first: bool,
     ) -> (u64, usize) {
         let (nodes, parents) = (scene.directory.nodes, scene.pages.parents());
         let mut path = [0; DEPTH_MAX];
@@ -304,7 +313,7 @@ impl<S: Simd> Walker<S> {
         for &parent in path[..levels].iter().rev() {
             let node = &nodes[parent as usize / WIDTH];
             let child = node.child[parent as usize % WIDTH];
-            let end = self.node::<ANY>(node, waiting, top);
+            let end = self.node(node, waiting, top, far_first);
             // If the child is not among those met, the best hit lies before it, and before all that come after it.
             let Some(at) = (top..end).find(|&at| waiting[at].child() == child) else { return (self.counts.nodes, top) };
             top = at;
@@ -322,6 +331,7 @@ impl<S: Simd> Walker<S> {
         body: &impl Form<'f>,
         waiting: &mut [Waiting; STACK],
         base: usize,
+        far_first: bool,
     ) {
         let mut room = Node::EMPTY;
         let mut top = base;
@@ -329,7 +339,7 @@ impl<S: Simd> Walker<S> {
         loop {
             let kind = Child::unpack(child);
             if let Child::Inner(index) = kind {
-                if let Some(next) = self.step::<ANY>(body.node(index as usize, &mut room), waiting, &mut top) {
+                if let Some(next) = self.step(body.node(index as usize, &mut room), waiting, &mut top, far_first) {
                     child = next.child();
                     continue;
                 }
@@ -345,7 +355,7 @@ impl<S: Simd> Walker<S> {
                 }
                 top -= 1;
                 let next = waiting[top];
-                if next.near::<ANY>() <= self.best.candidate.t {
+                if next.near(far_first) <= self.best.candidate.t {
                     child = next.child();
                     break;
                 }
@@ -355,8 +365,8 @@ impl<S: Simd> Walker<S> {
 
     /// Pushes the children of a node that the ray enters before its best hit, the first last; returns the new top.
     #[inline(always)]
-    fn node<const ANY: bool>(&mut self, node: &Node, waiting: &mut [Waiting; STACK], mut top: usize) -> usize {
-        if let Some(next) = self.step::<ANY>(node, waiting, &mut top) {
+    fn node(&mut self, node: &Node, waiting: &mut [Waiting; STACK], mut top: usize, far_first: bool) -> usize {
+        if let Some(next) = self.step(node, waiting, &mut top, far_first) {
             waiting[top] = next;
             top += 1;
         }
@@ -364,13 +374,14 @@ impl<S: Simd> Walker<S> {
     }
 
     /// The first of a node's children that the ray enters before its best hit; the others are pushed, the next last. First is
-    /// the nearest, for any hit the farthest.
+    /// the nearest, or the farthest.
     #[inline(always)]
-    fn step<const ANY: bool>(
+    fn step(
         &mut self,
         node: &Node,
         waiting: &mut [Waiting; STACK],
         top: &mut usize,
+        far_first: bool,
     ) -> Option<Waiting> {
         self.counts.nodes += 1;
         let (b, simd, rows) = (&self.boxes, self.simd, node.rows());
@@ -392,7 +403,7 @@ impl<S: Simd> Walker<S> {
         let mut take = || {
             let slot = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
-            (Waiting::new::<ANY>(near[slot], node.child[slot]), met != 0)
+            (Waiting::new(near[slot], node.child[slot], far_first), met != 0)
         };
         // Most nodes are left with one to three children.
         let (first, more) = take();

@@ -33,25 +33,37 @@ impl Pages for Share<'_> {
     }
 }
 
+/// A store that says that it has every page, and does.
+struct Whole<'a>(&'a Share<'a>);
+
+impl Pages for Whole<'_> {
+    const ALL: bool = true;
+    fn page(&self, number: u32) -> Option<PageView<'_>> {
+        self.0.page(number)
+    }
+    fn parents(&self) -> &[u32] {
+        self.0.parents
+    }
+}
+
 fn hang(built: &Built) -> Vec<u32> {
     let mut hang = vec![0; built.nodes.len() + built.pages.len()];
     parents(&built.nodes, &mut hang);
     hang
 }
 
-fn walk<const ANY: bool>(
+fn walk<const ANY: bool, P: Pages>(
     kernels: Kernels,
     directory: Directory<'_>,
-    pages: &Share<'_>,
+    pages: &P,
     ray: &Ray,
     best: Hit,
     from: u32,
     stack: &mut Stack,
 ) -> Walked {
     let (scene, mut counts) = (Resident { directory, pages }, Counts::default());
-    let walked =
-        kernels.run(Walk::<ANY, Share<'_>> { scene: &scene, ray, best, from, past: true, stack, counts: &mut counts });
-    assert!(counts.pages as usize <= pages.all.len());
+    let walked = kernels.run(Walk::<ANY, P> { scene: &scene, ray, best, from, past: true, stack, counts: &mut counts });
+    assert!(counts.pages as usize <= directory.entries.len());
     walked
 }
 
@@ -95,6 +107,7 @@ fn check(
     let resident = built.resident(&views);
     let share = |here| Share { all: &views, here, parents: &hang, seen: &seen };
     let everything = share(vec![true; views.len()]);
+    let whole_scene = Whole(&everything);
     let (of, mut stack) = (1 + random.below(5), Stack::new());
     let mut stores: Vec<Share<'_>> =
         (0..1 + random.below(5)).map(|_| share(views.iter().map(|_| random.below(of) == 1).collect())).collect();
@@ -108,7 +121,7 @@ fn check(
     for (ray, expected) in rays {
         for kernels in Kernels::available() {
             let what = format!("{name} {kernels:?} {} stores {ray:?}", stores.len());
-            let whole = walk::<false>(
+            let whole = walk::<false, _>(
                 kernels,
                 resident.directory,
                 &everything,
@@ -130,7 +143,7 @@ fn check(
                 let with: Vec<_> =
                     stores.iter().filter(|store| from == FROM_ROOT || store.here[from as usize]).collect();
                 let store = with[random.below(with.len())];
-                let walked = walk::<false>(kernels, resident.directory, store, &carried, best, from, &mut stack);
+                let walked = walk::<false, _>(kernels, resident.directory, store, &carried, best, from, &mut stack);
                 best = walked.best;
                 assert!(seen.borrow().len() <= views.len(), "{what}: on and on");
                 let Some(page) = walked.needs else { break };
@@ -155,7 +168,7 @@ fn check(
                     (0..stores.len()).filter(|&at| from == FROM_ROOT || stores[at].here[from as usize]).collect();
                 let at = with[random.below(with.len())];
                 let (store, none) = (&stores[at], Hit::none(carried.t_max));
-                let walked = walk::<true>(kernels, resident.directory, store, &carried, none, from, &mut stack);
+                let walked = walk::<true, _>(kernels, resident.directory, store, &carried, none, from, &mut stack);
                 assert!(seen.borrow().len() <= views.len(), "{what}: on and on");
                 seen.take();
                 if from == FROM_ROOT {
@@ -176,11 +189,20 @@ fn check(
                     assert_eq!(shapes.brute_force(&carried).is_hit(), expected.is_hit(), "{what}: cut at {end}");
                 }
                 from = page;
+                // One that has them all goes on in the order in which the walk began.
+                if random.below(4) == 0 {
+                    let none = Hit::none(carried.t_max);
+                    let walked =
+                        walk::<true, _>(kernels, resident.directory, &whole_scene, &carried, none, from, &mut stack);
+                    seen.take();
+                    assert_eq!(walked.needs, None, "{what}");
+                    break walked.best.candidate.is_hit();
+                }
             };
             // The nearest hit would have had to wait for a page.
             let (with, none) = (&stores[0], Hit::none(ray.t_max));
-            let any = walk::<true>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
-            let first = walk::<false>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
+            let any = walk::<true, _>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
+            let first = walk::<false, _>(kernels, resident.directory, with, ray, none, FROM_ROOT, &mut stack);
             tally.blocked_past += usize::from(any.best.candidate.is_hit() && first.needs.is_some());
             seen.take();
             assert_eq!(blocked, expected.is_hit(), "{what}");
@@ -294,12 +316,13 @@ fn walks_from_anywhere_end() {
             let none = Hit::none(ray.t_max);
             for kernels in Kernels::available() {
                 let ended = Walked { best: none, needs: None };
-                assert_eq!(walk::<false>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");
-                assert_eq!(walk::<true>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");
+                assert_eq!(walk::<false, _>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");
+                assert_eq!(walk::<true, _>(kernels, directory, &store, &ray, none, from, &mut stack), ended, "{from}");
             }
         }
         let from = random.below(views.len()) as u32;
-        let walked = walk::<false>(Kernels::detect(), directory, &store, &ray, Hit::none(ray.t_max), from, &mut stack);
+        let walked =
+            walk::<false, _>(Kernels::detect(), directory, &store, &ray, Hit::none(ray.t_max), from, &mut stack);
         assert!(!walked.best.candidate.precedes(&expected), "round {round}: nearer than the nearest from {from}");
         assert!(walked.needs.is_none_or(|page| !store.here[page as usize]), "round {round}");
         later += usize::from(walked.best.candidate.is_hit());

@@ -58,6 +58,9 @@ pub enum DirectoryError {
 
 /// Pages by number: all of a scene's, or those at hand.
 pub trait Pages {
+    /// Whether every page is always at hand.
+    const ALL: bool = false;
+
     /// The page, if it is at hand.
     fn page(&self, number: u32) -> Option<PageView<'_>>;
 
@@ -74,6 +77,8 @@ pub trait Pages {
 }
 
 impl Pages for [PageView<'_>] {
+    const ALL: bool = true;
+
     #[inline(always)]
     fn page(&self, number: u32) -> Option<PageView<'_>> {
         self.get(number as usize).copied()

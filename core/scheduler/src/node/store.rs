@@ -43,6 +43,8 @@ pub enum Landed {
 pub struct All<'a>(pub &'a [PageView<'a>]);
 
 impl Pages for All<'_> {
+    const ALL: bool = true;
+
     #[inline(always)]
     fn page(&self, number: u32) -> Option<PageView<'_>> {
         self.0.get(number as usize).copied()
