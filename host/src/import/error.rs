@@ -88,7 +88,9 @@ impl Warnings {
         let file = one_line(file);
         self.kinds.iter().map(move |Kind { text, line, count }| {
             let times = if *count == 1 { String::new() } else { format!(" ({count} times, here first)") };
-            one_line(&format!("{file}:{line}: {text}{times}"))
+            // A file without lines has line 0.
+            let line = if *line == 0 { String::new() } else { format!(":{line}") };
+            one_line(&format!("{file}{line}: {text}{times}"))
         })
     }
 }

@@ -1,15 +1,17 @@
-//! Import of scenes: OBJ with MTL, NFF, and Hybray's own scene files, which bring those together.
+//! Import of scenes: OBJ with MTL, glTF, PLY, NFF, and Hybray's own scene files, which bring those together.
 //!
 //! An importer reads one file into a [`Model`] and is done: no tree, no page, nothing of the renderer. It holds the
 //! file's triangles once (measured: see `tests::ten_million_triangles`), refuses what it cannot read with one line
 //! that names the place, and lists what it cannot honour in [`Model::warnings`].
 
 mod error;
+mod gltf;
 mod lines;
 mod meshes;
 mod mtl;
 mod nff;
 mod obj;
+mod ply;
 mod polygon;
 mod scene_toml;
 mod toml_values;
@@ -43,7 +45,7 @@ pub const COORDINATE_MAX: f32 = (1u128 << 100) as f32;
 /// Entries of a folder that are looked at for a name like the one that is not there.
 const ENTRIES_MAX: usize = 10_000;
 
-/// Reads a scene: a built-in one by its name, else a file by its extension (`.obj`, `.nff`, `.toml`).
+/// Reads a scene: a built-in one by its name, else a file by its extension (`.obj`, `.gltf`, `.glb`, `.ply`, `.nff`, `.toml`).
 ///
 /// The model that it returns passes [`validate()`] and has at least one primitive. It may have no camera and no light:
 /// [`crate::framing::complete`] gives it some.
@@ -56,9 +58,8 @@ pub fn load(source: &str) -> Result<Model, ImportError> {
         None => {
             let path = Path::new(source);
             match Format::of(path) {
-                Some(Format::Obj) => obj::load(path)?,
-                Some(Format::Nff) => nff::load(path)?,
                 Some(Format::Toml) => scene_toml::load(path)?,
+                Some(Format::Model(read)) => read(path)?,
                 None => return Err(unknown_format(path)),
             }
         }
@@ -74,10 +75,8 @@ pub fn load(source: &str) -> Result<Model, ImportError> {
 /// it, and +Y in everything else.
 #[must_use]
 pub fn up_axis(source: &str) -> [f32; 3] {
-    match Format::of(Path::new(source)) {
-        Some(Format::Nff) => [0.0, 0.0, 1.0],
-        _ => [0.0, 1.0, 0.0],
-    }
+    let is_nff = Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("nff"));
+    if is_nff { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] }
 }
 
 /// The scene that is built in under this name, if there is one.
@@ -89,18 +88,24 @@ fn builtin_model(name: &str) -> Result<Option<Model>, ImportError> {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a file is read.
+#[derive(Clone, Copy)]
 enum Format {
-    Obj,
-    Nff,
+    Model(fn(&Path) -> Result<Model, ImportError>),
+    /// Which brings files together.
     Toml,
 }
+
+/// The extensions of [`Format::Model`], for messages.
+const MODELS: &str = ".obj, .gltf, .glb, .ply or .nff";
 
 impl Format {
     fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "obj" => Some(Self::Obj),
-            "nff" => Some(Self::Nff),
+            "obj" => Some(Self::Model(obj::load)),
+            "gltf" | "glb" => Some(Self::Model(gltf::load)),
+            "ply" => Some(Self::Model(ply::load)),
+            "nff" => Some(Self::Model(nff::load)),
             "toml" => Some(Self::Toml),
             _ => None,
         }
@@ -183,7 +188,7 @@ fn like(path: &Path) -> String {
 
 fn unknown_format(path: &Path) -> ImportError {
     let file = path.display().to_string();
-    let known = "use .obj, .nff or .toml";
+    let known = "use .obj, .gltf, .glb, .ply, .nff or .toml";
     let Err(error) = std::fs::metadata(path) else {
         let (problem, remedy) = match open(path) {
             Err(other) => other.complaint(),

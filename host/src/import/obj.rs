@@ -145,7 +145,7 @@ fn to_mesh(piece: tobj::Mesh, about: &Piece, polygons: &mut Polygons, dropped: &
 }
 
 /// Normals at length 1; those without a length become the mean of the triangles around.
-fn units(mut normals: Vec<[f32; 3]>, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
+pub(super) fn units(mut normals: Vec<[f32; 3]>, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
     let mut around: BTreeMap<u32, [f64; 3]> = BTreeMap::new();
     for (i, normal) in normals.iter_mut().enumerate() {
         match unit(normal.map(f64::from)) {

@@ -12,7 +12,7 @@ use super::meshes::Meshes;
 use super::polygon::Polygons;
 use super::toml_values::{Maybe, Source};
 use super::transform::Transform;
-use super::{Format, builtin_model, mtl, nff, obj, open, validate};
+use super::{Format, MODELS, builtin_model, mtl, open, validate};
 use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
 use hybray_shading::{Highlight, Light, LightKind, Material};
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
         return Err(ImportError::new(&file, format!("cannot be read ({error})"), "check the disk and the file"));
     }
     if bytes.len() as u64 > FILE_BYTES_MAX {
-        let remedy = "put primitives into an OBJ or NFF file and include that";
+        let remedy = "put primitives into a model's file and include that";
         return Err(ImportError::new(&file, "a scene file of more than 16 MiB", remedy));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
@@ -132,7 +132,7 @@ impl Builder<'_> {
         }
         let path = self.folder.join(name);
         let format = Format::of(&path);
-        if format == Some(Format::Toml) {
+        if matches!(format, Some(Format::Toml)) {
             return fail(format!("{} is a scene file, and they do not nest", quote(name)), "include what it includes");
         }
         // Opened once here for the message: a file that is not there is this line's fault.
@@ -141,9 +141,8 @@ impl Builder<'_> {
             return fail(format!("{}: {problem}", quote(name)), &remedy);
         }
         match format {
-            Some(Format::Obj) => obj::load(&path),
-            Some(Format::Nff) => nff::load(&path),
-            _ => fail(format!("{} is no OBJ or NFF file", quote(name)), "include .obj, .nff or a built-in scene"),
+            Some(Format::Model(read)) => read(&path),
+            _ => fail(format!("{} is no model", quote(name)), &format!("include {MODELS}, or a built-in scene")),
         }
     }
 

@@ -71,8 +71,8 @@ fn sources_that_cannot_be_read() {
     check("empty.obj", ": the file is empty; export or copy it again");
     check("folder.obj", ": a folder, not a file; name a file in it");
     check("plain", ": a folder, not a file; name a file in it");
-    check("a.stl", ": `.stl` is no format that can be read; use .obj, .nff or .toml");
-    check("bare", ": the file has no extension to tell its format by; use .obj, .nff or .toml");
+    check("a.stl", ": `.stl` is no format that can be read; use .obj, .gltf, .glb, .ply, .nff or .toml");
+    check("bare", ": the file has no extension to tell its format by; use .obj, .gltf, .glb, .ply, .nff or .toml");
     check("none.obj", ": holds no faces; check that it is an OBJ file with `f` lines");
     check("none.nff", ": the scene holds no primitives; give it something to draw");
     check("none.toml", ": the scene holds no primitives; give it something to draw");

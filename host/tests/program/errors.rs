@@ -66,7 +66,7 @@ fn scenes_that_cannot_be_read() {
         check("beyond.obj", &["beyond.obj:2"]);
         check("broken.nff", &["broken.nff:11"]);
         check("folder", &["a folder, not a file", "name a file in it"]);
-        check("text.txt", &["`.txt` is no format", "use .obj, .nff or .toml"]);
+        check("text.txt", &["`.txt` is no format", "use .obj, .gltf, .glb, .ply, .nff or .toml"]);
     }
 }
 

@@ -194,7 +194,7 @@ fn mistakes_name_their_line() {
     check("[[include]]\nfile = 'x.stl'", "2: `x.stl`: there is no such file");
     check("[[include]]\nfile = 'other.toml'", "2: `other.toml` is a scene file, and they do not nest");
     check("[[include]]\nfile = '.'", "2: `.`: a folder, not a file");
-    check("[[include]]\nfile = 'two.mtl'", "2: `two.mtl` is no OBJ or NFF file");
+    check("[[include]]\nfile = 'two.mtl'", "2: `two.mtl` is no model;");
     check("[[include]]\nfile = 'spd:bals'", "2: `spd:bals`: there is no built-in scene");
     let two = "[[include]]\nfile = 'two.obj'\n";
     check(&format!("{two}scale = 0"), "3: `scale` is 0");

@@ -1,0 +1,828 @@
+//! glTF 2.0 and GLB through the crate `gltf`: meshes, the node hierarchy, cameras and punctual lights.
+//!
+//! The crate reads and checks the JSON; what it takes on trust is checked here: the lengths in a GLB's header (it overflows on one
+//! that is too short), that every accessor lies within its buffer, that no node is its own ancestor or has two parents, and
+//! what extensions the file cannot do without. It runs under `catch_unwind` besides.
+//!
+//! Every use of a mesh becomes triangles of its own, moved to where the node is: [`Model::warnings`] says how many times the
+//! triangles of the file that makes.
+
+use super::error::{ImportError, Warnings, quote};
+use super::mtl;
+use super::obj::units;
+use super::polygon::{has_area, unit};
+use super::{guarded, open};
+use crate::model::{CameraSpec, Mesh, Model};
+use gltf::accessor::{Accessor, DataType, Dimensions};
+use gltf::camera::Projection;
+use gltf::khr_lights_punctual::Kind;
+use gltf::material::AlphaMode;
+use gltf::mesh::Mode;
+use hybray_shading::{Highlight, Light, LightKind, Material};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read as _;
+use std::path::Path;
+
+/// What a file may say that it cannot be read without.
+const EXTENSIONS: [&str; 9] = [
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_texture_transform",
+];
+
+/// Exponents of highlights end here: of a surface smoother than this, who sees one sees a point.
+const EXPONENT_MAX: f32 = 10_000.0;
+
+/// Reads a `.gltf` or `.glb` file and the buffers that it names.
+pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
+    let file = path.display().to_string();
+    let mut bytes = Vec::new();
+    let mut reader = open(path).map_err(|e| e.into_error(&file))?;
+    if let Err(error) = reader.read_to_end(&mut bytes) {
+        return Err(ImportError::new(&file, format!("cannot be read ({error})"), "check the disk and the file"));
+    }
+    read(&bytes, &file, path.parent().unwrap_or(Path::new("")))
+}
+
+/// The same from bytes; `folder` is where buffers are looked for.
+pub(super) fn read(bytes: &[u8], file: &str, folder: &Path) -> Result<Model, ImportError> {
+    let again = "export the file again";
+    let bytes = whole(bytes).map_err(|problem| ImportError::new(file, problem, "copy or export the file again"))?;
+    let mut document = parse(bytes).map_err(|(problem, remedy)| ImportError::new(file, problem, remedy))?;
+    let blob = document.blob.take();
+    let buffers = buffers(&document, blob, file, folder)?;
+    let mut reader = Reader {
+        file,
+        document: &document,
+        buffers: &buffers,
+        model: Model::default(),
+        warnings: Warnings::default(),
+        materials: BTreeMap::new(),
+        used: BTreeSet::new(),
+        stored: 0,
+    };
+    match guarded(|| reader.scene()) {
+        Some(done) => done?,
+        None => return Err(ImportError::new(file, "the glTF parser fails on its contents", again)),
+    }
+    let Reader { mut model, warnings, stored, .. } = reader;
+    model.warnings.extend(warnings.lines(file));
+    if model.objects.polygons > stored {
+        let factor = model.objects.polygons as f64 / stored as f64;
+        model.warnings.push(format!(
+            "{file}: meshes that are used more than once are stored for each use: {factor:.1} times the triangles"
+        ));
+    }
+    if model.meshes.is_empty() {
+        return Err(ImportError::new(file, "its scene holds no triangles", "export meshes too"));
+    }
+    Ok(model)
+}
+
+/// What of a file counts: all of it, and of a GLB as much as its header says.
+fn whole(bytes: &[u8]) -> Result<&[u8], String> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok(bytes);
+    }
+    let header = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    match header {
+        Some(length) if length < 20 => Err(format!("a GLB that says that it is {length} bytes long")),
+        Some(length) => {
+            bytes.get(..length).ok_or_else(|| format!("a GLB of {length} bytes, of which {} are there", bytes.len()))
+        }
+        None => Err("a GLB that ends in its header".to_owned()),
+    }
+}
+
+/// The document, if it is one that can be read.
+fn parse(bytes: &[u8]) -> Result<gltf::Gltf, (String, &'static str)> {
+    let again = "export the file again";
+    let fails = || ("the glTF parser fails on it".to_owned(), again);
+    let document = match guarded(|| gltf::Gltf::from_slice_without_validation(bytes)).ok_or_else(fails)? {
+        Ok(document) => document,
+        Err(_) if is_first_version(bytes) => {
+            return Err(("glTF 1.0, and only 2.0 can be read".to_owned(), "export it as glTF 2.0"));
+        }
+        Err(error) => return Err((format!("the glTF parser refuses it ({error})"), again)),
+    };
+    if let Some(unknown) = document.extensions_required().find(|name| !EXTENSIONS.contains(name)) {
+        let problem = format!("cannot be read without the extension {}, which is not known here", quote(unknown));
+        return Err((problem, "export without it"));
+    }
+    match guarded(|| gltf::Gltf::from_slice(bytes)).ok_or_else(fails)? {
+        Ok(document) => Ok(document),
+        Err(gltf::Error::Validation(faults)) => {
+            // Bounds are promised, but nothing here needs them.
+            let is_bound = |path: &str| path.ends_with(".min") || path.ends_with(".max");
+            match faults.iter().find(|(path, _)| !is_bound(path.as_str())) {
+                None => Ok(document),
+                Some((path, fault)) => Err((format!("{path} is wrong ({fault})"), again)),
+            }
+        }
+        Err(error) => Err((format!("the glTF parser refuses it ({error})"), again)),
+    }
+}
+
+/// Whether a file that is no glTF 2.0 says that it is 1.0.
+fn is_first_version(bytes: &[u8]) -> bool {
+    if bytes.starts_with(b"glTF") {
+        return bytes.get(4..8) == Some(&[1, 0, 0, 0]);
+    }
+    let text = serde_json::from_slice::<serde_json::Value>(bytes).ok();
+    let version = text.as_ref().and_then(|text| text.get("asset")?.get("version")?.as_str());
+    version.is_some_and(|version| version.starts_with('1'))
+}
+
+/// The bytes of every buffer.
+fn buffers(
+    document: &gltf::Document,
+    mut blob: Option<Vec<u8>>,
+    file: &str,
+    folder: &Path,
+) -> Result<Vec<Vec<u8>>, ImportError> {
+    document
+        .buffers()
+        .map(|buffer| {
+            let fail = |problem: String, remedy: &str| {
+                ImportError::new(file, format!("buffer {}: {problem}", buffer.index()), remedy)
+            };
+            let length = buffer.length();
+            let data = match buffer.source() {
+                gltf::buffer::Source::Bin => {
+                    blob.take().ok_or_else(|| fail("it is not in the file".into(), "export as GLB again"))?
+                }
+                gltf::buffer::Source::Uri(uri) if uri.starts_with("data:") => {
+                    let broken = |what: String| fail(format!("no data URI ({what})"), "export the file again");
+                    let url = data_url::DataUrl::process(uri).map_err(|e| broken(format!("{e:?}")))?;
+                    url.decode_to_vec().map_err(|e| broken(format!("{e:?}")))?.0
+                }
+                gltf::buffer::Source::Uri(uri) => {
+                    if uri.contains("://") {
+                        return Err(fail(
+                            format!("{} is not on this machine", quote(uri)),
+                            "fetch it, and name the file",
+                        ));
+                    }
+                    let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+                    let path = folder.join(&*name);
+                    let reader = open(&path).map_err(|e| e.into_error(&path.display().to_string()))?;
+                    let mut data = Vec::new();
+                    let read = reader.take(length as u64).read_to_end(&mut data);
+                    read.map_err(|e| fail(format!("{} cannot be read ({e})", quote(&name)), "check the disk"))?;
+                    data
+                }
+            };
+            if data.len() < length {
+                let problem = format!("it has {} of its {length} bytes", data.len());
+                return Err(fail(problem, "copy or export the file again"));
+            }
+            Ok(data)
+        })
+        .collect()
+}
+
+/// `p -> linear p + shift`, in f64.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Rows.
+    linear: [[f64; 3]; 3],
+    shift: [f64; 3],
+}
+
+impl Place {
+    const IDENTITY: Self = Self { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
+
+    fn of(node: &gltf::Node<'_>) -> Self {
+        // Columns.
+        let m = node.transform().matrix().map(|column| column.map(f64::from));
+        Self { linear: [0, 1, 2].map(|row| [m[0][row], m[1][row], m[2][row]]), shift: [m[3][0], m[3][1], m[3][2]] }
+    }
+
+    fn direction(&self, v: [f64; 3]) -> [f64; 3] {
+        self.linear.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    }
+
+    fn point(&self, p: [f32; 3]) -> [f32; 3] {
+        let turned = self.direction(p.map(f64::from));
+        [0, 1, 2].map(|i| (turned[i] + self.shift[i]) as f32)
+    }
+
+    /// First `self`, then `outer`.
+    fn within(&self, outer: &Self) -> Self {
+        let column = |i: usize| outer.direction([self.linear[0][i], self.linear[1][i], self.linear[2][i]]);
+        let (x, y, z) = (column(0), column(1), column(2));
+        let shift = outer.direction(self.shift);
+        Self {
+            linear: [0, 1, 2].map(|row| [x[row], y[row], z[row]]),
+            shift: [0, 1, 2].map(|i| shift[i] + outer.shift[i]),
+        }
+    }
+
+    /// Where normals go, up to a factor of more than 0, and whether the inside is turned out.
+    fn normals(&self) -> (Self, bool) {
+        let [a, b, c] = self.linear;
+        let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
+        let mirrored = dot(a, cofactors[0]) < 0.0;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        (Self { linear: cofactors.map(|row| row.map(|x| x * sign)), shift: [0.0; 3] }, mirrored)
+    }
+
+    fn unit(&self, v: [f64; 3]) -> [f32; 3] {
+        unit(self.direction(v)).unwrap_or(v).map(|c| c as f32)
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+struct Reader<'a> {
+    file: &'a str,
+    document: &'a gltf::Document,
+    buffers: &'a [Vec<u8>],
+    model: Model,
+    warnings: Warnings,
+    /// Of the file's materials, by index, those that were met: where they stand in the model.
+    materials: BTreeMap<Option<usize>, u16>,
+    /// Meshes that were met.
+    used: BTreeSet<usize>,
+    /// Triangles of those.
+    stored: u64,
+}
+
+impl Reader<'_> {
+    fn error(&self, problem: impl AsRef<str>, remedy: &str) -> ImportError {
+        ImportError::new(self.file, problem, remedy)
+    }
+
+    fn warn(&mut self, text: &str) {
+        self.warnings.add(0, text);
+    }
+
+    /// Everything in the scene that the file shows first, or in its only one.
+    fn scene(&mut self) -> Result<(), ImportError> {
+        let document = self.document;
+        let scene = document.default_scene().or_else(|| document.scenes().next());
+        let mut waiting: Vec<(gltf::Node<'_>, Place)> = match scene {
+            Some(scene) => scene.nodes().map(|node| (node, Place::IDENTITY)).collect(),
+            None => {
+                let below: BTreeSet<usize> = document.nodes().flat_map(|n| n.children().map(|c| c.index())).collect();
+                let roots = document.nodes().filter(|node| !below.contains(&node.index()));
+                roots.map(|node| (node, Place::IDENTITY)).collect()
+            }
+        };
+        waiting.reverse();
+        let mut met = BTreeSet::new();
+        while let Some((node, outer)) = waiting.pop() {
+            if !met.insert(node.index()) {
+                let problem = format!("node {} has more than one parent, or is its own ancestor", node.index());
+                return Err(self.error(problem, "export the file again"));
+            }
+            let place = Place::of(&node).within(&outer);
+            if let Some(mesh) = node.mesh() {
+                self.mesh(&node, &mesh, &place)?;
+            }
+            if let Some(camera) = node.camera() {
+                self.camera(&node, &camera, &place);
+            }
+            if let Some(light) = node.light() {
+                self.light(&light, &place);
+            }
+            let first = waiting.len();
+            waiting.extend(node.children().map(|child| (child, place)));
+            waiting[first..].reverse();
+        }
+        if document.animations().len() > 0 {
+            self.warn("animations are not played: nodes stand where the file puts them");
+        }
+        Ok(())
+    }
+
+    fn mesh(&mut self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, place: &Place) -> Result<(), ImportError> {
+        if node.skin().is_some() {
+            self.warn("skins are not used: meshes stand as they were modelled");
+        }
+        let is_new = self.used.insert(mesh.index());
+        for primitive in mesh.primitives() {
+            let name = mesh.name().unwrap_or("mesh");
+            let what = format!("mesh {} ({})", mesh.index(), quote(name));
+            if primitive.morph_targets().len() > 0 {
+                self.warn("morph targets are not used: meshes stand as they were modelled");
+            }
+            if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+                self.warn("lines and points are not drawn");
+                continue;
+            }
+            let (normals_place, mirrored) = place.normals();
+            let Some((positions, normals, triangles)) = self.triangles(&primitive, &what)? else { continue };
+            if !is_new && self.model.objects.polygons + triangles.len() as u64 > COPIES_MAX {
+                let problem = format!("uses of {what} make more than {COPIES_MAX} triangles");
+                return Err(self.error(problem, "leave some of them out"));
+            }
+            let material = self.material(&primitive)?;
+            let Some(material) = material else { continue };
+            let placed: Vec<[f32; 3]> = positions.iter().map(|&p| place.point(p)).collect();
+            let count = triangles.len() as u64;
+            let triangles: Vec<[u32; 3]> = triangles
+                .into_iter()
+                .map(|[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
+                .filter(|t| has_area(placed[t[0] as usize], placed[t[1] as usize], placed[t[2] as usize]))
+                .collect();
+            self.stored += if is_new { count } else { 0 };
+            self.model.objects.polygons += count;
+            if triangles.len() as u64 != count {
+                self.warn("triangles without area are left out");
+            }
+            if triangles.is_empty() {
+                continue;
+            }
+            let normals = normals.iter().map(|n| normals_place.unit(n.map(f64::from))).collect();
+            let normals = units(normals, &placed, &triangles);
+            let mesh = Mesh { name: name.to_owned(), positions: placed, normals, triangles, material };
+            self.model.meshes.push(mesh);
+        }
+        Ok(())
+    }
+}
+
+type Points = Vec<[f32; 3]>;
+
+impl Reader<'_> {
+    /// Positions, normals (none, or one for each position) and triangles of a primitive; `None` if it has none.
+    fn triangles(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        what: &str,
+    ) -> Result<Option<(Points, Points, Vec<[u32; 3]>)>, ImportError> {
+        let Some(positions) = primitive.get(&gltf::Semantic::Positions) else { return Ok(None) };
+        self.check(&positions, &[DataType::F32], Dimensions::Vec3, what)?;
+        let count = positions.count();
+        let normals = primitive.get(&gltf::Semantic::Normals);
+        if let Some(normals) = &normals {
+            self.check(normals, &[DataType::F32], Dimensions::Vec3, what)?;
+            if normals.count() != count {
+                let problem = format!("{what} has {} normals for {count} positions", normals.count());
+                return Err(self.error(problem, "export the file again"));
+            }
+        }
+        if let Some(indices) = primitive.indices() {
+            self.check(&indices, &[DataType::U8, DataType::U16, DataType::U32], Dimensions::Scalar, what)?;
+        }
+        let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
+        let unreadable = || self.error(format!("{what} cannot be read"), "export the file again");
+        let positions: Points = reader.read_positions().ok_or_else(unreadable)?.collect();
+        let normals: Points = match normals {
+            Some(_) => reader.read_normals().ok_or_else(unreadable)?.collect(),
+            None => Vec::new(),
+        };
+        let corners: Vec<u32> = match primitive.indices() {
+            Some(_) => reader.read_indices().ok_or_else(unreadable)?.into_u32().collect(),
+            None => (0..count as u32).collect(),
+        };
+        if let Some(corner) = corners.iter().find(|&&corner| corner as usize >= count) {
+            return Err(self.error(format!("{what} names vertex {corner} of {count}"), "export the file again"));
+        }
+        let triangles = match primitive.mode() {
+            Mode::TriangleStrip => {
+                let turned = |(i, t): (usize, &[u32])| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                corners.windows(3).enumerate().map(turned).collect()
+            }
+            Mode::TriangleFan => corners.windows(2).skip(1).map(|t| [corners[0], t[0], t[1]]).collect(),
+            _ => corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        };
+        Ok(Some((positions, normals, triangles)))
+    }
+
+    /// That an accessor is of the kind that is wanted and lies within its buffer.
+    fn check(
+        &self,
+        accessor: &Accessor<'_>,
+        types: &[DataType],
+        dimensions: Dimensions,
+        what: &str,
+    ) -> Result<(), ImportError> {
+        let number = accessor.index();
+        let fail =
+            |problem: String| Err(self.error(format!("{what}, accessor {number}: {problem}"), "export the file again"));
+        if !types.contains(&accessor.data_type()) || accessor.dimensions() != dimensions {
+            return fail(format!(
+                "{:?} of {:?} is not what glTF has here",
+                accessor.dimensions(),
+                accessor.data_type()
+            ));
+        }
+        let within = |view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize| {
+            let (view_end, stride) = (view.offset().checked_add(view.length()), view.stride().unwrap_or(size));
+            let end =
+                count.checked_sub(1).and_then(|last| last.checked_mul(stride)?.checked_add(size)?.checked_add(offset));
+            stride >= size
+                && end.is_some_and(|end| end <= view.length())
+                && view_end.is_some_and(|end| end <= self.buffers[view.buffer().index()].len())
+        };
+        let (count, size) = (accessor.count(), accessor.size());
+        let is_within = match accessor.view() {
+            Some(view) => within(&view, accessor.offset(), count, size),
+            // All zero, but for what stands in the sparse part.
+            None => accessor.sparse().is_some() && (1..=UNSTORED_MAX).contains(&count),
+        };
+        if !is_within {
+            return fail(format!("its {count} values do not lie within their buffer"));
+        }
+        if let Some(sparse) = accessor.sparse() {
+            let (indices, values) = (sparse.indices(), sparse.values());
+            let index_size = match indices.index_type() {
+                gltf::accessor::sparse::IndexType::U8 => 1,
+                gltf::accessor::sparse::IndexType::U16 => 2,
+                gltf::accessor::sparse::IndexType::U32 => 4,
+            };
+            let count = sparse.count();
+            let are = within(&indices.view(), indices.offset(), count, index_size)
+                && within(&values.view(), values.offset(), count, size);
+            if !are {
+                return fail(format!("its {count} sparse values do not lie within their buffer"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a primitive's material stands in the model; `None` if nothing of it is seen.
+    fn material(&mut self, primitive: &gltf::Primitive<'_>) -> Result<Option<u16>, ImportError> {
+        if primitive.get(&gltf::Semantic::Colors(0)).is_some() {
+            self.warn("colours of vertices are not used");
+        }
+        let from = primitive.material();
+        let pbr = from.pbr_metallic_roughness();
+        let is_cut = from.alpha_mode() == AlphaMode::Mask
+            && pbr.base_color_texture().is_none()
+            && pbr.base_color_factor()[3] < from.alpha_cutoff().unwrap_or(0.5);
+        if is_cut {
+            return Ok(None);
+        }
+        if let Some(&index) = self.materials.get(&from.index()) {
+            return Ok(Some(index));
+        }
+        let textures = [
+            (pbr.base_color_texture().is_some(), "base colours"),
+            (pbr.metallic_roughness_texture().is_some(), "metalness and roughness"),
+            (from.normal_texture().is_some(), "normals"),
+            (from.occlusion_texture().is_some(), "occlusion"),
+            (from.emissive_texture().is_some(), "emission"),
+            (from.transmission().is_some_and(|t| t.transmission_texture().is_some()), "transmission"),
+        ];
+        for (is_there, of) in textures {
+            if is_there {
+                self.warn(&format!("textures of {of} are not used"));
+            }
+        }
+        if (0.05..1.0).contains(&pbr.roughness_factor()) && pbr.metallic_factor() > 0.0 {
+            self.warn("rough metal is drawn with a highlight and a matt share, not with blurred reflections");
+        }
+        if from.volume().is_some() {
+            self.warn("absorption within volumes is not used");
+        }
+        if self.model.materials.len() >= usize::from(u16::MAX) {
+            return Err(self.error("more than 65,535 materials", "use fewer materials"));
+        }
+        let name = from
+            .name()
+            .map_or_else(|| from.index().map_or("default".into(), |i| format!("material {i}")), str::to_owned);
+        let material = if from.index().is_some() { translated(&from) } else { mtl::DEFAULT };
+        let index = self.model.add_material(&name, material);
+        self.materials.insert(from.index(), index);
+        Ok(Some(index))
+    }
+
+    fn camera(&mut self, node: &gltf::Node<'_>, camera: &gltf::Camera<'_>, place: &Place) {
+        let name = camera.name().or(node.name()).map_or_else(|| format!("camera {}", camera.index()), str::to_owned);
+        let Projection::Perspective(perspective) = camera.projection() else {
+            self.warn(&format!("the camera {} is orthographic, and left out", quote(&name)));
+            return;
+        };
+        let eye = place.point([0.0; 3]);
+        let ahead = place.unit([0.0, 0.0, -1.0]);
+        // Far enough that the target differs from the eye, wherever that is.
+        let far = eye.iter().fold(1.0_f32, |far, c| far.max(c.abs()));
+        self.model.cameras.push(CameraSpec {
+            name,
+            eye,
+            target: [0, 1, 2].map(|i| eye[i] + ahead[i] * far),
+            up: place.unit([0.0, 1.0, 0.0]),
+            fov_y_degrees: perspective.yfov().to_degrees(),
+            hither: 0.0,
+            size: None,
+        });
+    }
+
+    /// Candela and lux become what a white, matt surface shows: over pi.
+    fn light(&mut self, from: &gltf::khr_lights_punctual::Light<'_>, place: &Place) {
+        let colour = from.color().map(|c| c * from.intensity() / std::f32::consts::PI);
+        let mut light = Light { position: place.point([0.0; 3]), colour, ..Light::default() };
+        let axis = place.unit([0.0, 0.0, -1.0]);
+        match from.kind() {
+            Kind::Directional => (light.kind, light.axis) = (LightKind::Directional as u32, axis),
+            Kind::Point => (light.kind, light.flags) = (LightKind::Point as u32, Light::FALLOFF),
+            Kind::Spot { inner_cone_angle, outer_cone_angle } => {
+                (light.kind, light.axis, light.flags) = (LightKind::Spot as u32, axis, Light::FALLOFF);
+                light.cos_outer = libm::cosf(outer_cone_angle);
+                light.cos_inner = libm::cosf(inner_cone_angle).max(light.cos_outer);
+            }
+        }
+        if from.range().is_some() {
+            self.warn("lights shine beyond their range, as light does");
+        }
+        self.model.lights.push(light);
+    }
+}
+
+/// Triangles that a scene may have when another use of a mesh adds to them: some 4 GB.
+const COPIES_MAX: u64 = 1 << 26;
+
+/// Values of an accessor that has no bytes but for its sparse part.
+const UNSTORED_MAX: usize = 1 << 24;
+
+/// A metallic-roughness material in Whitted's model: a dielectric as diffuse with a highlight of Fresnel's reflectance at
+/// normal incidence, metal as a mirror as far as it is smooth and as diffuse as far as it is rough, transmission as refraction.
+fn translated(from: &gltf::Material<'_>) -> Material {
+    let pbr = from.pbr_metallic_roughness();
+    let [r, g, b, alpha] = pbr.base_color_factor();
+    let base = [r, g, b];
+    if from.unlit() {
+        return Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission: base, ..Material::MATT };
+    }
+    let (metal, rough) = (pbr.metallic_factor(), pbr.roughness_factor());
+    let smooth = (1.0 - rough) * (1.0 - rough);
+    let through = from.transmission().map_or(0.0, |t| t.transmission_factor()) * (1.0 - metal);
+    let ior = from.ior().unwrap_or(1.5);
+    let normal_incidence = ((ior - 1.0) / (ior + 1.0)) * ((ior - 1.0) / (ior + 1.0));
+    let seen = if from.alpha_mode() == AlphaMode::Blend { alpha } else { 1.0 };
+    let emission = from.emissive_factor().map(|c| c * from.emissive_strength().unwrap_or(1.0));
+
+    let diffuse = base.map(|c| c * seen * ((1.0 - metal) * (1.0 - through) + metal * (1.0 - smooth)));
+    let mirror = base.map(|c| c * seen * metal * smooth);
+    // Blinn's exponent for a width of roughness squared, and the height that keeps the highlight's light the same.
+    let width = rough * rough;
+    let exponent = (2.0 / (width * width).max(1e-9) - 2.0).min(EXPONENT_MAX);
+    let height = (exponent + 8.0) / 8.0;
+    let specular = base.map(|c| seen * height * (normal_incidence * (1.0 - metal) + c * metal));
+    let shines = exponent > 0.0 && specular.iter().any(|&c| c > 0.0);
+    let glass = through > 0.0;
+    Material {
+        diffuse,
+        ambient: diffuse,
+        emission: emission.map(|c| c * seen),
+        specular: if shines { specular } else { [0.0; 3] },
+        mirror,
+        transmission: base.map(|c| if glass { c * through * seen } else { 1.0 - seen }),
+        exponent: if shines { exponent } else { 0.0 },
+        ior: if glass { ior.max(1.0) } else { 1.0 },
+        highlight: if shines { Highlight::Blinn } else { Highlight::None } as u32,
+        flags: if glass { Material::FRESNEL } else { 0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Choices, Folder};
+    use super::*;
+    use serde_json::{Value, json};
+
+    /// A quad of two triangles in the plane z = 0, seen from +z; a fourth corner that only the sparse part has; bytes.
+    fn bytes() -> Vec<u8> {
+        let floats: [f32; 24] = [
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, // positions
+            0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, // normals
+        ];
+        let sparse: [f32; 3] = [1.0, 1.0, 0.0];
+        let mut bytes: Vec<u8> = floats.iter().chain(&sparse).flat_map(|x| x.to_le_bytes()).collect();
+        // The index of the sparse corner; those of the triangles.
+        bytes.extend([3, 0, 1, 2, 2, 1, 3]);
+        bytes
+    }
+
+    fn scene() -> Value {
+        let uri: String = bytes().iter().map(|b| format!("%{b:02x}")).collect();
+        let view = |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
+        json!({
+            "asset": {"version": "2.0"},
+            "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_transmission", "KHR_materials_ior"],
+            "extensionsRequired": ["KHR_lights_punctual"],
+            "buffers": [{"byteLength": 115, "uri": format!("data:application/octet-stream,{uri}")}],
+            "bufferViews": [view(0, 48), view(48, 48), view(96, 12), view(108, 1), view(109, 6)],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "sparse": {
+                    "count": 1, "indices": {"bufferView": 3, "componentType": 5121}, "values": {"bufferView": 2}}},
+                {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
+                {"bufferView": 4, "componentType": 5121, "count": 6, "type": "SCALAR"},
+            ],
+            "materials": [
+                {"name": "metal", "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.5, 0.25, 1.0], "roughnessFactor": 0.0}},
+                {"name": "glass", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.0},
+                 "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": 1.33}}},
+                {"name": "cut", "alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}},
+            ],
+            "meshes": [
+                {"name": "quad", "primitives": [
+                    {"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2, "material": 0},
+                    {"attributes": {"POSITION": 0}, "mode": 5, "material": 1},
+                    {"attributes": {"POSITION": 0}, "mode": 6, "material": 2},
+                    {"attributes": {"POSITION": 0}, "mode": 0},
+                ]},
+            ],
+            "cameras": [
+                {"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}},
+                {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}},
+            ],
+            "extensions": {"KHR_lights_punctual": {"lights": [
+                {"type": "point", "intensity": 100, "color": [1, 0.5, 0]},
+                {"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}},
+                {"type": "directional"},
+            ]}},
+            // The second is the first's child, mirrored; the third uses the mesh again.
+            "nodes": [
+                {"translation": [10, 0, 0], "scale": [2, 2, 2], "children": [1, 3, 4]},
+                {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+                {"mesh": 0, "rotation": [0.0, 0.70710678, 0.0, 0.70710678]},
+                {"camera": 0, "name": "eye"},
+                {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+                {"camera": 1, "extensions": {"KHR_lights_punctual": {"light": 0}}},
+                {"extensions": {"KHR_lights_punctual": {"light": 2}}},
+            ],
+            "scenes": [{"nodes": [0, 2, 5, 6]}],
+        })
+    }
+
+    fn load_scene(scene: &Value) -> Result<Model, String> {
+        read(scene.to_string().as_bytes(), "a.gltf", Path::new("")).map_err(|e| e.to_string())
+    }
+
+    fn glb(scene: &Value) -> Vec<u8> {
+        let mut scene = scene.clone();
+        scene["buffers"][0].as_object_mut().expect("an object").remove("uri");
+        let (mut text, mut data) = (scene.to_string().into_bytes(), bytes());
+        text.resize(text.len().next_multiple_of(4), b' ');
+        data.resize(data.len().next_multiple_of(4), 0);
+        let mut out = b"glTF".to_vec();
+        for number in [2, 12 + 8 + text.len() + 8 + data.len(), text.len()] {
+            out.extend((number as u32).to_le_bytes());
+        }
+        out.extend(b"JSON");
+        out.extend(text);
+        out.extend((data.len() as u32).to_le_bytes());
+        out.extend(b"BIN\0");
+        out.extend(data);
+        out
+    }
+
+    #[test]
+    fn nodes_place_and_mirror_what_is_in_them() {
+        let model = load_scene(&scene()).expect("reads");
+        let corners = |mesh: &Mesh| -> Vec<[f32; 3]> {
+            mesh.triangles
+                .iter()
+                .flatten()
+                .map(|&i| mesh.positions[i as usize].map(|c| (c * 1e5).round() / 1e5))
+                .collect()
+        };
+        let [mirrored, strip, turned, _] = &model.meshes[..] else { panic!("{} meshes", model.meshes.len()) };
+        let (o, x, y, xy) = ([10.0, 0.0, 0.0], [8.0, 0.0, 0.0], [10.0, 2.0, 0.0], [8.0, 2.0, 0.0]);
+        assert_eq!(corners(mirrored), [o, y, x, y, xy, x]);
+        assert_eq!(corners(strip), [o, y, x, y, xy, x]);
+        // A quarter turn around y takes x to -z, and z to x.
+        let (o, x, y, xy) = ([0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [0.0, 1.0, -1.0]);
+        assert_eq!(corners(turned), [o, x, y, y, x, xy]);
+        for mesh in [mirrored, turned] {
+            for triangle in &mesh.triangles {
+                let own = super::super::polygon::newell(&triangle.map(|i| mesh.positions[i as usize]));
+                let normal = mesh.normals[triangle[0] as usize].map(f64::from);
+                assert!(dot(unit(own).expect("area"), normal) > 0.99, "{own:?} {normal:?}");
+            }
+        }
+        assert_eq!(model.objects.polygons, 8);
+        assert_eq!(
+            model.warnings,
+            [
+                "a.gltf: lines and points are not drawn (2 times, here first)",
+                "a.gltf: the camera `camera 1` is orthographic, and left out",
+                "a.gltf: meshes that are used more than once are stored for each use: 2.0 times the triangles",
+            ]
+        );
+    }
+
+    #[test]
+    fn materials_cameras_and_lights() {
+        let model = load_scene(&scene()).expect("reads");
+        let names: Vec<&str> = model.materials.iter().map(|m| m.name.as_str()).collect();
+        assert_eq!(names, ["metal", "glass"]);
+        let [metal, glass] = [0, 1].map(|i| model.materials[i].material);
+        assert_eq!((metal.mirror, metal.diffuse), ([1.0, 0.5, 0.25], [0.0; 3]));
+        assert_eq!((glass.transmission, glass.ior, glass.flags), ([1.0; 3], 1.33, Material::FRESNEL));
+        let camera = &model.cameras[0];
+        assert_eq!((camera.name.as_str(), camera.eye, camera.up), ("eye", [10.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
+        assert_eq!(camera.target, [10.0, 0.0, -10.0]);
+        assert!((camera.fov_y_degrees - 0.5f32.to_degrees()).abs() < 1e-5);
+        let [spot, point, sun] = &model.lights[..] else { panic!("{} lights", model.lights.len()) };
+        let pi = std::f32::consts::PI;
+        assert_eq!((point.kind(), point.flags, point.colour), (LightKind::Point, 1, [100.0 / pi, 50.0 / pi, 0.0]));
+        assert_eq!((spot.kind(), spot.position, spot.axis), (LightKind::Spot, [10.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
+        assert!((spot.cos_inner - 0.1f32.cos()).abs() < 1e-6 && (spot.cos_outer - 0.2f32.cos()).abs() < 1e-6);
+        assert_eq!((sun.kind(), sun.flags, sun.axis), (LightKind::Directional, 0, [0.0, 0.0, -1.0]));
+    }
+
+    #[test]
+    fn a_glb_is_the_same_scene() {
+        let expected = load_scene(&scene()).expect("reads");
+        let mut bytes = glb(&scene());
+        // What stands after the length that the header gives is not of the file.
+        bytes.extend(b"more");
+        let model = read(&bytes, "a.gltf", Path::new("")).expect("reads");
+        assert_eq!(format!("{model:?}"), format!("{expected:?}"));
+    }
+
+    #[test]
+    fn buffers_beside_the_file() {
+        let folder = Folder::new(&[]);
+        folder.write("a b.bin", &bytes());
+        let mut scene = scene();
+        scene["buffers"][0]["uri"] = json!("a%20b.bin");
+        folder.write("a.gltf", scene.to_string().as_bytes());
+        let model = load(&folder.path().join("a.gltf")).expect("reads");
+        assert_eq!(model.meshes.len(), 4);
+        scene["buffers"][0]["uri"] = json!("b.bin");
+        folder.write("a.gltf", scene.to_string().as_bytes());
+        let error = load(&folder.path().join("a.gltf")).expect_err("nothing there").to_string();
+        assert!(error.ends_with("b.bin: there is no such file; check the path"), "{error}");
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let check = |change: &dyn Fn(&mut Value), expected: &str| {
+            let mut scene = scene();
+            change(&mut scene);
+            let error = load_scene(&scene).expect_err(expected);
+            assert!(error.starts_with(&format!("a.gltf: {expected}")), "{error}");
+        };
+        let first = |s: &mut Value| (s["asset"]["version"], s["meshes"]) = (json!("1.0"), json!({}));
+        check(&first, "glTF 1.0, and only 2.0 can be read;");
+        check(
+            &|s| s["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
+            "cannot be read without the extension `KHR_draco",
+        );
+        check(&|s| s["nodes"][3]["children"] = json!([0]), "node 0 has more than one parent");
+        check(&|s| s["nodes"][1]["mesh"] = json!(7), "nodes[1].mesh is wrong");
+        check(&|s| s["accessors"][1]["count"] = json!(5), "mesh 0 (`quad`), accessor 1: its 5 values do not lie");
+        check(&|s| s["accessors"][1]["count"] = json!(3), "mesh 0 (`quad`) has 3 normals for 4 positions");
+        check(
+            &|s| s["accessors"][1]["byteOffset"] = json!(u64::MAX),
+            "mesh 0 (`quad`), accessor 1: its 4 values do not lie",
+        );
+        check(&|s| s["accessors"][0]["sparse"]["count"] = json!(2), "mesh 0 (`quad`), accessor 0: its 2 sparse values");
+        check(&|s| s["accessors"][1]["componentType"] = json!(5122), "mesh 0 (`quad`), accessor 1: Vec3 of I16 is not");
+        let fewer = |s: &mut Value| (0..2).for_each(|i| s["accessors"][i]["count"] = json!(3));
+        check(&fewer, "mesh 0 (`quad`) names vertex 3 of 3");
+        let error = read(&glb(&scene())[..300], "a.glb", Path::new("")).expect_err("cut").to_string();
+        assert!(error.starts_with("a.glb: a GLB of ") && error.contains(" bytes, of which 300 are there;"), "{error}");
+        for length in [0, 11, 12, 19, u32::MAX] {
+            let mut bytes = glb(&scene());
+            bytes[8..12].copy_from_slice(&length.to_le_bytes());
+            read(&bytes, "a.glb", Path::new("")).expect_err("no such length");
+        }
+    }
+
+    #[test]
+    fn broken_files_end_in_an_error_or_a_model() {
+        let (mut choices, mut read_, mut refused) = (Choices(9), 0, 0);
+        for round in 0..3000 {
+            let mut bytes = if round % 2 == 0 { glb(&scene()) } else { scene().to_string().into_bytes() };
+            for _ in 0..1 + choices.below(3) {
+                let at = choices.below(bytes.len());
+                match choices.below(8) {
+                    0 => bytes.truncate(at.max(1)),
+                    1..4 => bytes[at] = b"0123456789-.,e[]"[choices.below(16)],
+                    _ => bytes[at] ^= 1 << choices.below(8),
+                }
+            }
+            match read(&bytes, "a.glb", Path::new("")) {
+                Ok(model) => {
+                    let within = |m: &Mesh| m.triangles.iter().flatten().all(|&i| (i as usize) < m.positions.len());
+                    assert!(model.meshes.iter().all(within));
+                    read_ += 1;
+                }
+                Err(error) => {
+                    assert_eq!(error.to_string().lines().count(), 1, "{error}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(read_ > 300 && refused > 300, "{read_} {refused}");
+    }
+}
