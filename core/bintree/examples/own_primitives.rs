@@ -8,7 +8,7 @@ use hybray_bintree::walk::{self, Counts, Resident, Stack};
 use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Cone, Ray, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Kind, Node, PageEntry, PageForm, PageView, Tables};
+use hybray_scene::{Directory, Kind, Node, PageEntry, PageView, Tables};
 
 /// The caller's own data. Ids: the triangles first, then the balls.
 struct Garden {
@@ -69,9 +69,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &items,
         &garden,
         16 * 1024,
-        PageForm::Full,
         &mut forests,
         &mut scratch,
+        None,
         &mut |aabb, cut| match cut {
             Cut::Above => above.above(aabb),
             Cut::Page(lines) => {

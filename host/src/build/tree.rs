@@ -8,7 +8,7 @@ use hybray_bintree::reinsert::Link;
 use hybray_bintree::sah::{Binning, Bins, Extents};
 use hybray_bintree::{BinaryNode, Forest, Item, midpoint, reinsert, sah};
 use hybray_geometry::Aabb;
-use hybray_scene::{Line, PageView};
+use hybray_scene::{Line, PageForm, PageView};
 use rayon::prelude::*;
 
 /// Items of a chunk: small enough for its scratch to stay in the cache, large enough to keep every core busy.
@@ -57,6 +57,18 @@ impl VoxelTree {
     }
 }
 
+/// Room for a page under construction.
+struct Scratch {
+    page: Box<cut::Scratch>,
+    compact: Option<Box<cut::CompactScratch>>,
+}
+
+impl Scratch {
+    fn new(form: PageForm) -> Self {
+        Self { page: zeroed_box(), compact: (form == PageForm::Compact).then(zeroed_box) }
+    }
+}
+
 fn surface_area<P: Primitives + Sync>(
     items: &mut [Item],
     source: &P,
@@ -81,7 +93,7 @@ fn surface_area<P: Primitives + Sync>(
     let chunks = parts
         .into_par_iter()
         .map_init(
-            || (Vec::new(), Vec::new(), zeroed_box::<cut::Scratch>()),
+            || (Vec::new(), Vec::new(), Scratch::new(settings.pages)),
             |(nodes, forests, scratch), part| {
                 let used = built(part, nodes, &sah::Settings { depth, ..sah::Settings::default() });
                 reinsert::reinsert(&mut nodes[..used], &mut vec![Link::EMPTY; used], depth);
@@ -140,7 +152,14 @@ fn midpoints<P: Primitives>(
     let tree = midpoint::build(&mut items, count, &mut leaves, &mut nodes, &rule);
     let (used, held) = (tree.nodes.len(), tree.items.len());
     midpoint::tighten(&mut nodes[..used], &leaves[..held]);
-    let chunk = cut_chunk(&nodes[..used], &leaves[..held], source, settings, &mut Vec::new(), &mut zeroed_box())?;
+    let chunk = cut_chunk(
+        &nodes[..used],
+        &leaves[..held],
+        source,
+        settings,
+        &mut Vec::new(),
+        &mut Scratch::new(settings.pages),
+    )?;
     let root = BinaryNode { second: 0, ..nodes[0] };
     Ok(VoxelTree { tops: vec![root], chunks: vec![chunk] })
 }
@@ -161,7 +180,7 @@ fn cut_chunk<P: Primitives>(
     source: &P,
     settings: &Settings,
     forests: &mut Vec<Forest>,
-    scratch: &mut cut::Scratch,
+    scratch: &mut Scratch,
 ) -> Result<Chunk, CutError> {
     let mut chunk = Chunk { pages: Vec::new(), events: Vec::new() };
     forests.resize(nodes.len().max(forests.len()), Forest::EMPTY);
@@ -170,9 +189,9 @@ fn cut_chunk<P: Primitives>(
         items,
         source,
         settings.page_bytes,
-        settings.pages,
         forests,
-        scratch,
+        &mut scratch.page,
+        scratch.compact.as_deref_mut(),
         &mut |aabb, cut| match cut {
             Cut::Above => chunk.events.push((*aabb, None)),
             Cut::Page(lines) => {

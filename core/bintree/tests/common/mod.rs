@@ -192,11 +192,19 @@ pub fn cut_tree(shapes: &Shapes, tree: &Tree, page_bytes: usize) -> Result<Built
 
 pub fn cut_tree_into(shapes: &Shapes, tree: &Tree, page_bytes: usize, form: PageForm) -> Result<Built, CutError> {
     let mut scratch = Box::<cut::Scratch>::default();
+    let mut compact = (form == PageForm::Compact).then(Box::<cut::CompactScratch>::default);
     let mut above = top::Builder::new();
     let (mut pages, mut entries) = (Vec::new(), Vec::new());
     let mut forests = vec![Forest::EMPTY; tree.nodes.len()];
-    cut::pages(&tree.nodes, &tree.items, shapes, page_bytes, form, &mut forests, &mut scratch, &mut |aabb, cut| {
-        match cut {
+    cut::pages(
+        &tree.nodes,
+        &tree.items,
+        shapes,
+        page_bytes,
+        &mut forests,
+        &mut scratch,
+        compact.as_deref_mut(),
+        &mut |aabb, cut| match cut {
             Cut::Above => above.above(aabb),
             Cut::Page(lines) => {
                 above.page(aabb, pages.len() as u32);
@@ -206,8 +214,8 @@ pub fn cut_tree_into(shapes: &Shapes, tree: &Tree, page_bytes: usize, form: Page
                 entries.push(PageEntry { bytes: header.bytes, owner: 0, kind: 0 });
                 pages.push(lines.to_vec());
             }
-        }
-    })?;
+        },
+    )?;
     let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
     let above = above.finish();
     forests.resize(above.len(), Forest::EMPTY);
