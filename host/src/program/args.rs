@@ -51,7 +51,7 @@ pub(super) enum Verb {
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
-    /// A file (.obj, .nff, .toml, .hyb), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
+    /// A file (.obj, .gltf, .glb, .ply, .nff, .toml, .hyb), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
     pub scene: String,
 }
 
