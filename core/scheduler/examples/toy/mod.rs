@@ -2,7 +2,7 @@
 
 use hybray_bintree::{BinaryNode, Forest, Item, cut, sah, top};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageForm, PageView, Tables};
+use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageView, Tables};
 use hybray_shading::{Highlight, Light, LightKind, Material, spawn};
 use hybray_tracer::Scene;
 use hybray_wire::Frame;
@@ -78,9 +78,9 @@ impl Toy {
             &items,
             &spheres,
             4096,
-            PageForm::Full,
             &mut forests,
             &mut Box::default(),
+            None,
             &mut |around, cut| {
                 if let cut::Cut::Page(lines) = cut {
                     aabb = *around;

@@ -5,7 +5,7 @@ use hybray_bintree::cut::{self, Cut, Primitives};
 use hybray_bintree::walk::Resident;
 use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::{Cone, Sphere, Triangle, Vec3};
-use hybray_scene::{Directory, Header, Kind, Node, PageEntry, PageForm, PageView, Tables};
+use hybray_scene::{Directory, Header, Kind, Node, PageEntry, PageView, Tables};
 use hybray_shading::{self as shading, Light, Material, spawn};
 use hybray_tracer::Scene;
 
@@ -74,15 +74,8 @@ impl World {
         let (mut pages, mut entries, mut above) = (Vec::new(), Vec::new(), top::Builder::new());
         let mut scratch = Box::<cut::Scratch>::default();
         let mut forests = vec![Forest::EMPTY; used];
-        cut::pages(
-            &binary[..used],
-            &items,
-            self,
-            page_bytes,
-            PageForm::Full,
-            &mut forests,
-            &mut scratch,
-            &mut |aabb, cut| match cut {
+        cut::pages(&binary[..used], &items, self, page_bytes, &mut forests, &mut scratch, None, &mut |aabb, cut| {
+            match cut {
                 Cut::Above => above.above(aabb),
                 Cut::Page(lines) => {
                     above.page(aabb, pages.len() as u32);
@@ -90,8 +83,8 @@ impl World {
                     entries.push(PageEntry { bytes: header.bytes, owner: 0, kind: 0 });
                     pages.push(lines.to_vec());
                 }
-            },
-        )
+            }
+        })
         .expect("a page holds a leaf");
         let mut nodes = vec![Node::EMPTY; top::nodes_for(pages.len())];
         let above = above.finish();
