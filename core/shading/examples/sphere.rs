@@ -88,8 +88,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     continue;
                 };
                 sum += Vec3::from(spawn::local(&scene, &surface, weight));
+                let facing = spawn::Facing::new(&surface);
                 for cursor in 0..spawn::children(&scene, &surface) {
-                    match spawn::child(&scene, &surface, weight, depth, id, cursor) {
+                    match spawn::child(&scene, &facing, weight, depth, id, cursor) {
                         Child::Shadow { origin, direction, t_max, contribution, .. } => {
                             let left = lit(&scene, origin, direction, t_max, contribution);
                             sum += left.map_or(Vec3::ZERO, Vec3::from);

@@ -108,7 +108,7 @@ pub fn shadow_rays(lights: &[Light]) -> u32 {
 /// What the surface shows without any light: emission and ambient light, times `weight`.
 #[must_use]
 pub fn local(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3]) -> [f32; 3] {
-    let material = material(scene, surface);
+    let material = material(scene, surface.material);
     channels(|c| weight[c] * (material.emission[c] + material.ambient[c] * scene.ambient[c]))
 }
 
@@ -116,7 +116,7 @@ pub fn local(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3]) -> [f32; 3]
 /// and one for the refracted ray, as far as its material has any use for them.
 #[must_use]
 pub fn children(scene: &Scene<'_>, surface: &Surface) -> u32 {
-    let material = material(scene, surface);
+    let material = material(scene, surface.material);
     let last = if material.transmits() {
         2
     } else if material.mirrors() {
@@ -131,16 +131,15 @@ pub fn children(scene: &Scene<'_>, surface: &Surface) -> u32 {
 ///
 /// Bounded work: constant if every light casts one shadow ray, else at most one look at each light.
 #[must_use]
-pub fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
-    let material = material(scene, surface);
-    let facing = Facing::new(surface);
+pub fn child(scene: &Scene<'_>, facing: &Facing, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
+    let material = material(scene, facing.material);
     if let Some(past_lights) = cursor.checked_sub(scene.shadow_rays) {
         let deeper = depth < scene.ray_depth_max;
         return match past_lights {
             0 if deeper && (material.mirrors() || material.transmits()) => {
-                mirrored(scene, material, surface, &facing, weight, cursor)
+                mirrored(scene, material, facing, weight, cursor)
             }
-            1 if deeper && material.transmits() => refracted(scene, material, surface, &facing, weight, cursor),
+            1 if deeper && material.transmits() => refracted(scene, material, facing, weight, cursor),
             _ => Child::None,
         };
     }
@@ -151,7 +150,7 @@ pub fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32,
     let Some((light, first)) = find_light(scene, cursor) else {
         return Child::None;
     };
-    shadow(scene, material, surface, &facing, light, first, weight, id, cursor)
+    shadow(scene, material, facing, light, first, weight, id, cursor)
 }
 
 /// The cursor positions of the shadow rays to the light that `cursor` is one of; none past the last light.
@@ -163,7 +162,7 @@ pub fn of_one_light(scene: &Scene<'_>, cursor: u32) -> Range<u32> {
 /// What a material lets through of a shadow ray's `contribution`; `None` if nothing.
 #[must_use]
 pub fn let_through(scene: &Scene<'_>, material: u16, contribution: [f32; 3]) -> Option<[f32; 3]> {
-    let material = scene.materials.get(usize::from(material)).unwrap_or(&Material::MATT);
+    let material = self::material(scene, material);
     let left = channels(|c| contribution[c] * material.transmission[c]);
     (left != [0.0; 3]).then_some(left)
 }
@@ -186,29 +185,58 @@ pub fn pass_through(scene: &Scene<'_>, surface: &Surface, contribution: [f32; 3]
 /// of both vectors, and less than a picture shows.
 const GRAZING: f32 = 1.0 / 65_536.0;
 
-/// The normals on the side from which the surface is seen.
-struct Facing {
+/// A hit from the side from which it is seen: what all rays that it spawns begin with, computed once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    position: Vec3,
+    error: Vec3,
+    incoming: Vec3,
     geometric: Vec3,
     shading: Vec3,
-    /// Of the shadow rays, zero unless it lifts the point.
-    shadow_offset: Vec3,
+    /// Where shadow rays start.
+    shadow_origin: Vec3,
+    /// Whether that lies above the surface.
+    lifted: bool,
+    material: u16,
+    medium: u16,
 }
 
 impl Facing {
-    fn new(surface: &Surface) -> Self {
-        let normal = surface.geometric_normal;
-        let geometric = if normal.dot(surface.incoming) > 0.0 { -normal } else { normal };
-        let shading = surface.shading_normal;
+    /// What fills unused room.
+    pub const EMPTY: Self = Self {
+        position: Vec3::ZERO,
+        error: Vec3::ZERO,
+        incoming: Vec3::ZERO,
+        geometric: Vec3::ZERO,
+        shading: Vec3::ZERO,
+        shadow_origin: Vec3::ZERO,
+        lifted: false,
+        material: 0,
+        medium: 0,
+    };
+
+    /// The hit on `surface`.
+    #[must_use]
+    pub fn new(surface: &Surface) -> Self {
+        let Surface { position, error, geometric_normal, shading_normal, shadow_offset, incoming, material, medium } =
+            *surface;
+        let geometric = if geometric_normal.dot(incoming) > 0.0 { -geometric_normal } else { geometric_normal };
         // By the geometric normal and not by the view: a shading normal may lean away from the viewer.
-        let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
-        let lifts = surface.shadow_offset.dot(geometric) > 0.0;
-        Self { geometric, shading, shadow_offset: if lifts { surface.shadow_offset } else { Vec3::ZERO } }
+        let shading = if shading_normal.dot(geometric) < 0.0 { -shading_normal } else { shading_normal };
+        let lifted = shadow_offset.dot(geometric) > 0.0;
+        // The lifted point is rounded once more. Shadow rays start on the viewer's side, wherever the light is.
+        let shadow_offset = if lifted { shadow_offset } else { Vec3::ZERO };
+        let start = position + shadow_offset;
+        let start_error = error + (start.abs() + shadow_offset.abs()) * f32::EPSILON;
+        let start_error = if lifted { start_error } else { error };
+        let shadow_origin = offset_origin(start, start_error, geometric, geometric);
+        Self { position, error, incoming, geometric, shading, shadow_origin, lifted, material, medium }
     }
 
     /// The shading normal, bent just enough to face the viewer, and its cosine with the view.
-    fn towards_viewer(&self, incoming: Vec3) -> (Vec3, f32) {
-        let normal = lift(self.shading, -incoming);
-        let cosine = -normal.dot(incoming);
+    fn towards_viewer(&self) -> (Vec3, f32) {
+        let normal = lift(self.shading, -self.incoming);
+        let cosine = -normal.dot(self.incoming);
         (normal, if cosine < 1.0 { cosine } else { 1.0 })
     }
 }
@@ -219,8 +247,8 @@ fn lift(direction: Vec3, normal: Vec3) -> Vec3 {
     if cosine >= GRAZING { direction } else { normalize(direction + normal * (GRAZING - cosine)) }
 }
 
-fn material<'a>(scene: &Scene<'a>, surface: &Surface) -> &'a Material {
-    scene.materials.get(usize::from(surface.material)).unwrap_or(&Material::MATT)
+fn material<'a>(scene: &Scene<'a>, index: u16) -> &'a Material {
+    scene.materials.get(usize::from(index)).unwrap_or(&Material::MATT)
 }
 
 fn channels(f: impl Fn(usize) -> f32) -> [f32; 3] {
@@ -246,7 +274,6 @@ fn find_light<'a>(scene: &Scene<'a>, cursor: u32) -> Option<(&'a Light, u32)> {
 fn shadow(
     scene: &Scene<'_>,
     material: &Material,
-    surface: &Surface,
     facing: &Facing,
     light: &Light,
     first: u32,
@@ -259,11 +286,7 @@ fn shadow(
         LightKind::Point | LightKind::Directional | LightKind::Spot => [0.5; 2],
         LightKind::Sphere | LightKind::Rectangle => stratified(id::random(id, first), cursor - first, rays),
     };
-    // The lifted point is rounded once more. Shadow rays start on the viewer's side, wherever the light is.
-    let lifted = surface.position + facing.shadow_offset;
-    let error = surface.error + (lifted.abs() + facing.shadow_offset.abs()) * f32::EPSILON;
-    let error = if facing.shadow_offset == Vec3::ZERO { surface.error } else { error };
-    let origin = offset_origin(lifted, error, facing.geometric, facing.geometric);
+    let origin = facing.shadow_origin;
     let Some(found) = arrival(light, origin, scene.distance_scale, sample) else {
         return Child::None;
     };
@@ -271,10 +294,10 @@ fn shadow(
     // the ray finds out: the facets that turn from the light before the smooth surface does are what it was lifted for.
     let behind = facing.geometric.dot(found.direction) <= 0.0;
     let cosine = facing.shading.dot(found.direction);
-    if !(cosine > 0.0) || (behind && facing.shadow_offset == Vec3::ZERO) {
+    if !(cosine > 0.0) || (behind && !facing.lifted) {
         return Child::None;
     }
-    let highlight = highlight::strength(material, surface.incoming, facing.shading, found.direction);
+    let highlight = highlight::strength(material, facing.incoming, facing.shading, found.direction);
     let strength = found.strength / rays as f32;
     let contribution = channels(|c| {
         weight[c] * (light.colour[c] * strength) * (material.diffuse[c] * cosine + material.specular[c] * highlight)
@@ -297,15 +320,15 @@ struct Crossing {
 }
 
 impl Crossing {
-    fn new(scene: &Scene<'_>, material: &Material, surface: &Surface, facing: &Facing) -> Self {
-        let inside = surface.material.saturating_add(1);
-        let here = match surface.medium.checked_sub(1) {
+    fn new(scene: &Scene<'_>, material: &Material, facing: &Facing) -> Self {
+        let inside = facing.material.saturating_add(1);
+        let here = match facing.medium.checked_sub(1) {
             None => 1.0,
             Some(around) => scene.materials.get(usize::from(around)).map_or(1.0, index_of_refraction),
         };
-        let (there, medium) = if surface.medium == inside { (1.0, 0) } else { (index_of_refraction(material), inside) };
+        let (there, medium) = if facing.medium == inside { (1.0, 0) } else { (index_of_refraction(material), inside) };
         let eta = here / there;
-        let (normal, cos_in) = facing.towards_viewer(surface.incoming);
+        let (normal, cos_in) = facing.towards_viewer();
         Self { normal, cos_in, eta, boundary: optics::boundary(eta, cos_in), medium }
     }
 
@@ -324,50 +347,35 @@ fn carries(scene: &Scene<'_>, weight: [f32; 3]) -> bool {
     weight.iter().any(|&w| w > 0.0 && w >= scene.weight_cutoff)
 }
 
-fn mirrored(
-    scene: &Scene<'_>,
-    material: &Material,
-    surface: &Surface,
-    facing: &Facing,
-    weight: [f32; 3],
-    cursor: u32,
-) -> Child {
-    let share =
-        if material.transmits() { Crossing::new(scene, material, surface, facing).mirrored(material) } else { 0.0 };
+fn mirrored(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], cursor: u32) -> Child {
+    let share = if material.transmits() { Crossing::new(scene, material, facing).mirrored(material) } else { 0.0 };
     let weight = channels(|c| weight[c] * (material.mirror[c] + material.transmission[c] * share));
     if !carries(scene, weight) {
         return Child::None;
     }
-    let (normal, _) = facing.towards_viewer(surface.incoming);
-    let direction = lift(normalize(optics::mirror(surface.incoming, normal)), facing.geometric);
+    let (normal, _) = facing.towards_viewer();
+    let direction = lift(normalize(optics::mirror(facing.incoming, normal)), facing.geometric);
     Child::Mirror {
-        origin: offset_origin(surface.position, surface.error, facing.geometric, facing.geometric),
+        origin: offset_origin(facing.position, facing.error, facing.geometric, facing.geometric),
         direction,
         weight,
-        medium: surface.medium,
+        medium: facing.medium,
         branch: cursor.saturating_add(1),
     }
 }
 
-fn refracted(
-    scene: &Scene<'_>,
-    material: &Material,
-    surface: &Surface,
-    facing: &Facing,
-    weight: [f32; 3],
-    cursor: u32,
-) -> Child {
-    let crossing = Crossing::new(scene, material, surface, facing);
+fn refracted(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], cursor: u32) -> Child {
+    let crossing = Crossing::new(scene, material, facing);
     let share = 1.0 - crossing.mirrored(material);
     let weight = channels(|c| weight[c] * (material.transmission[c] * share));
     if crossing.boundary.total || !carries(scene, weight) {
         return Child::None;
     }
     let Crossing { normal, cos_in, eta, boundary, medium } = crossing;
-    let direction = normalize(optics::refract(surface.incoming, normal, eta, cos_in, boundary.cos_out));
+    let direction = normalize(optics::refract(facing.incoming, normal, eta, cos_in, boundary.cos_out));
     let beyond = -facing.geometric;
     Child::Refract {
-        origin: offset_origin(surface.position, surface.error, beyond, beyond),
+        origin: offset_origin(facing.position, facing.error, beyond, beyond),
         direction: lift(direction, beyond),
         weight,
         medium,

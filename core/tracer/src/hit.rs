@@ -4,7 +4,8 @@ use hybray_bintree::cut::FLAT;
 use hybray_bintree::walk::Hit;
 use hybray_geometry::{Ray, RayKernel, SurfacePoint, Vec3, gamma};
 use hybray_scene::{BLOCK, Kind, PageView, Slot};
-use hybray_shading::{Child, Surface, id, spawn, unpack_normal};
+use hybray_shading::spawn::{self, Facing};
+use hybray_shading::{Child, Surface, id, unpack_normal};
 use hybray_wire::RayRecord;
 
 /// Whom a ray and its children are traced for.
@@ -32,7 +33,7 @@ impl Origin {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HitRecord {
     /// Where.
-    pub surface: Surface,
+    pub facing: Facing,
     /// The weight of the ray that hit.
     pub weight: [f32; 3],
     /// The ray that hit.
@@ -58,16 +59,7 @@ const _: () = assert!(size_of::<HitRecord>() <= 160);
 impl HitRecord {
     /// What fills a lane before it is used.
     pub const EMPTY: Self = Self {
-        surface: Surface {
-            position: Vec3::ZERO,
-            error: Vec3::ZERO,
-            geometric_normal: Vec3::Z,
-            shading_normal: Vec3::Z,
-            shadow_offset: Vec3::ZERO,
-            incoming: Vec3::Z,
-            material: 0,
-            medium: 0,
-        },
+        facing: Facing::EMPTY,
         weight: [0.0; 3],
         id: 0,
         children: 0,
@@ -103,7 +95,7 @@ impl HitRecord {
 
     /// The child at `cursor`.
     pub(crate) fn child(&self, shading: &hybray_shading::Scene<'_>, cursor: u32) -> Child {
-        spawn::child(shading, &self.surface, self.weight, u32::from(self.depth), self.id, cursor)
+        spawn::child(shading, &self.facing, self.weight, u32::from(self.depth), self.id, cursor)
     }
 
     /// The id of a child.

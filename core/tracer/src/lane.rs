@@ -8,7 +8,8 @@ use hybray_bintree::walk::{self, FROM_ROOT, Hit, Stack, Walk, Walked};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
 use hybray_scene::{Pages, Slot};
-use hybray_shading::{Child, spawn};
+use hybray_shading::Child;
+use hybray_shading::spawn::{self, Facing};
 use hybray_wire::{Counts, RayKind, RayRecord};
 
 /// Where results go.
@@ -336,7 +337,8 @@ pub fn begin<S: Sink, P: Pages + ?Sized>(
     counts.hits += 1;
     add(sink, &origin, spawn::local(&scene.shading, &surface, ray.weight));
     let end = spawn::children(&scene.shading, &surface);
-    Some(HitRecord { surface, weight: ray.weight, id: ray.id, end, origin, depth: ray.depth, ..HitRecord::EMPTY })
+    let facing = Facing::new(&surface);
+    Some(HitRecord { facing, weight: ray.weight, id: ray.id, end, origin, depth: ray.depth, ..HitRecord::EMPTY })
 }
 
 /// Zero adds nothing, and is not sent.

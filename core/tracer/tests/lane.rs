@@ -147,7 +147,7 @@ fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
         for cursor in 0..spawn::children(&scene.shading, &place) {
             let depth = ray.depth.into();
             let (origin, direction, weight, medium, branch, kind) =
-                match spawn::child(&scene.shading, &place, ray.weight, depth, ray.id, cursor) {
+                match spawn::child(&scene.shading, &spawn::Facing::new(&place), ray.weight, depth, ray.id, cursor) {
                     spawn::Child::None => continue,
                     spawn::Child::Shadow { origin, direction, t_max, contribution, .. } => {
                         add(arriving_by_hand(scene, &Ray { origin, direction, t_min: 0.0, t_max }, contribution));

@@ -26,7 +26,9 @@ pub fn sets(prepared: &Prepared, scene: &Scene<'_>, primary: Vec<Ray>) -> Vec<(K
         let hit = nearest(hybray_tests::kernels(), &scene.resident, ray, &mut stack, &mut counts);
         let page = hit.candidate.is_hit().then(|| scene.resident.pages[hit.page as usize]);
         let Some(place) = page.and_then(|page| surface(&page, &record(ray), &hit)) else { continue };
-        if let Child::Shadow { origin, direction, t_max, .. } = spawn::child(&shading, &place, [1.0; 3], 1, 0, 0) {
+        if let Child::Shadow { origin, direction, t_max, .. } =
+            spawn::child(&shading, &spawn::Facing::new(&place), [1.0; 3], 1, 0, 0)
+        {
             shadow.push(Ray { origin, direction, t_min: 0.0, t_max });
         }
         bounce.push(bounced(&place, &mut random));

@@ -5,6 +5,10 @@ use std::{vec, vec::Vec};
 const WHITE: [f32; 3] = [1.0; 3];
 
 /// A flat surface at the origin, seen from straight above.
+fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
+    super::child(scene, &Facing::new(surface), weight, depth, id, cursor)
+}
+
 fn floor() -> Surface {
     Surface {
         position: Vec3::ZERO,
