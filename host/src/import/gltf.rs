@@ -356,14 +356,12 @@ impl Reader<'_> {
 }
 
 type Points = Vec<[f32; 3]>;
+/// Positions, normals (none, or one for each position), and triangles.
+type Corners = (Points, Points, Vec<[u32; 3]>);
 
 impl Reader<'_> {
-    /// Positions, normals (none, or one for each position) and triangles of a primitive; `None` if it has none.
-    fn triangles(
-        &self,
-        primitive: &gltf::Primitive<'_>,
-        what: &str,
-    ) -> Result<Option<(Points, Points, Vec<[u32; 3]>)>, ImportError> {
+    /// What a primitive holds; `None` if nothing.
+    fn triangles(&self, primitive: &gltf::Primitive<'_>, what: &str) -> Result<Option<Corners>, ImportError> {
         let Some(positions) = primitive.get(&gltf::Semantic::Positions) else { return Ok(None) };
         self.check(&positions, &[DataType::F32], Dimensions::Vec3, what)?;
         let count = positions.count();
@@ -611,6 +609,7 @@ mod tests {
 
     fn scene() -> Value {
         let uri: String = bytes().iter().map(|b| format!("%{b:02x}")).collect();
+        let half = std::f32::consts::FRAC_1_SQRT_2;
         let view = |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
         json!({
             "asset": {"version": "2.0"},
@@ -651,7 +650,7 @@ mod tests {
             "nodes": [
                 {"translation": [10, 0, 0], "scale": [2, 2, 2], "children": [1, 3, 4]},
                 {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
-                {"mesh": 0, "rotation": [0.0, 0.70710678, 0.0, 0.70710678]},
+                {"mesh": 0, "rotation": [0.0, half, 0.0, half]},
                 {"camera": 0, "name": "eye"},
                 {"extensions": {"KHR_lights_punctual": {"light": 1}}},
                 {"camera": 1, "extensions": {"KHR_lights_punctual": {"light": 0}}},

@@ -3,16 +3,22 @@
 //! [`Output::create`] is called before any rendering, so that a wrong path costs nobody an hour; [`Output::write`] puts
 //! the finished file in place in one step. What is written is sRGB in PNG and PPM, and the radiance itself in EXR.
 
+mod compare;
 mod encode;
+mod flip;
 mod output;
 pub(crate) mod pending;
+mod read;
 mod srgb;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use compare::{Difference, difference};
+pub use flip::{PIXELS_PER_DEGREE, flip};
 pub use output::Output;
-pub use srgb::{encode_srgb8, encode_srgb16};
+pub use read::read;
+pub use srgb::{decode_srgb, encode_srgb8, encode_srgb16};
 
 /// A rendered picture: linear radiance, red, green and blue of Rec. 709.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! The sRGB transfer function, exact: linear light in, code value out.
+//! The sRGB transfer function, exact, both ways.
 //!
 //! Source: IEC 61966-2-1. The power is taken in double precision: in single precision one of 650 values between 0 and 1
 //! is rounded to the wrong 16-bit code. It costs 49 ns a value on one core of an AMD EPYC.
@@ -32,6 +32,12 @@ fn transfer(linear: f64) -> f64 {
         // Not-a-number ends here too: it is not greater than anything.
         0.0
     }
+}
+
+/// Linear light of an sRGB code, both 0 to 1.
+#[must_use]
+pub fn decode_srgb(code: f64) -> f32 {
+    (if code <= 0.04045 { code / 12.92 } else { libm::pow((code + 0.055) / 1.055, 2.4) }) as f32
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::build::{Rule, Settings};
 use crate::partition::{PILOT_RAYS, Voxels};
+use crate::picture::PIXELS_PER_DEGREE;
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -38,6 +39,8 @@ pub(super) enum Verb {
     Trace(TraceArgs),
     /// Write a scene in another format: .nff, .obj (with .mtl) or .pov
     Convert(ConvertArgs),
+    /// Say how far one picture is from another
+    Compare(CompareArgs),
     /// List the built-in scenes
     Scenes,
     /// Print a shell's completion script
@@ -533,6 +536,27 @@ pub(super) struct ConvertArgs {
     /// Columns and rows, pixels, for formats that say so
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// The picture to compare with: PNG, EXR or PPM
+    pub reference: PathBuf,
+    /// The picture that is looked at
+    pub test: PathBuf,
+    /// Draw where a difference is seen: black for nowhere, white for most
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
+    /// Pixels in a degree of what is seen
+    #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE, value_parser = pixels_per_degree)]
+    pub pixels_per_degree: f32,
+    /// Write the figures as JSON to this file; `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+fn pixels_per_degree(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|n| (1.0..=1000.0).contains(n)).ok_or_else(|| "give a number from 1 to 1000".to_owned())
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

@@ -5,6 +5,7 @@
 
 mod args;
 mod budget;
+mod compare;
 mod convert;
 mod info;
 mod keep;
@@ -47,6 +48,7 @@ pub fn main() -> ExitCode {
         Verb::Pack(args) => pack::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Convert(args) => convert::run(&args),
+        Verb::Compare(args) => compare::run(&args),
         Verb::Scenes => info::list_builtin(),
         Verb::Completions { shell } => completions(shell),
         Verb::Man => man(),

@@ -93,3 +93,44 @@ fn a_picture_that_is_there_is_replaced() {
     png(&folder.read("a.png"), png::BitDepth::Eight);
     assert_eq!(folder.names(), ["a.png"]);
 }
+
+#[test]
+fn pictures_are_compared() {
+    let folder = Folder::new();
+    for name in ["a.exr", "a.png"] {
+        folder.succeed(&format!("render {SCENE} -o {name}"));
+    }
+    folder.succeed(&format!("render {SCENE} -o b.exr --seed 2"));
+    folder.succeed("render cornell -q --size 8x8 --spp 1 -o small.png");
+    let json = |arguments: &str| -> serde_json::Value {
+        serde_json::from_slice(&folder.succeed(&format!("compare {arguments} --json -")).1).unwrap()
+    };
+    let same = json("a.exr a.exr");
+    assert_eq!(
+        (same["rmse"].as_f64(), same["channels_that_differ"].as_u64(), same["flip"].as_f64()),
+        (Some(0.0), Some(0), Some(0.0))
+    );
+    // By the formula, from the values themselves.
+    let [a, b] = ["a.exr", "b.exr"].map(|name| exr(&folder.read(name)));
+    let sum: f64 = a.iter().zip(&b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let found = json("a.exr b.exr --map map.png");
+    assert!((found["rmse"].as_f64().unwrap() - (sum / a.len() as f64).sqrt()).abs() < 1e-9 && sum > 0.0, "{found}");
+    png(&folder.read("map.png"), png::BitDepth::Eight);
+    let (_, out) = folder.succeed("compare a.exr b.exr --json report.json");
+    let text = String::from_utf8(out).unwrap();
+    assert!(["RMSE ", "relMSE ", "worst pixel ", "FLIP "].iter().all(|line| text.contains(line)), "{text}");
+    assert_eq!(
+        serde_json::from_slice::<serde_json::Value>(&folder.read("report.json")).unwrap()["rmse"],
+        found["rmse"]
+    );
+
+    for (arguments, expected) in [
+        ("a.png small.png", "`a.png` has 37 x 26 pixels and `small.png` 8 x 8; compare pictures of one size"),
+        ("a.png none.png", "cannot read picture `none.png`"),
+        ("a.png report.json", "cannot read picture `report.json`: neither PNG, EXR nor binary PPM"),
+    ] {
+        let output = folder.run(&format!("compare {arguments}"));
+        assert_eq!(output.status.code(), Some(1), "{arguments}");
+        assert!(super::talk(&output).contains(expected), "{}", super::talk(&output));
+    }
+}
