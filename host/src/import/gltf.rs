@@ -10,6 +10,7 @@
 use super::error::{ImportError, Warnings, quote};
 use super::mtl;
 use super::obj::units;
+use super::physical::Physical;
 use super::polygon::{has_area, unit};
 use super::{guarded, open};
 use crate::model::{CameraSpec, Mesh, Model};
@@ -18,7 +19,7 @@ use gltf::camera::Projection;
 use gltf::khr_lights_punctual::Kind;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
-use hybray_shading::{Highlight, Light, LightKind, Material};
+use hybray_shading::{Light, LightKind, Material};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::Path;
@@ -35,9 +36,6 @@ const EXTENSIONS: [&str; 9] = [
     "KHR_materials_volume",
     "KHR_texture_transform",
 ];
-
-/// Exponents of highlights end here: of a surface smoother than this, who sees one sees a point.
-const EXPONENT_MAX: f32 = 10_000.0;
 
 /// Reads a `.gltf` or `.glb` file and the buffers that it names.
 pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
@@ -548,8 +546,7 @@ const COPIES_MAX: u64 = 1 << 26;
 /// Values of an accessor that has no bytes but for its sparse part.
 const UNSTORED_MAX: usize = 1 << 24;
 
-/// A metallic-roughness material in Whitted's model: a dielectric as diffuse with a highlight of Fresnel's reflectance at
-/// normal incidence, metal as a mirror as far as it is smooth and as diffuse as far as it is rough, transmission as refraction.
+/// A material in Whitted's model: see [`Physical`].
 fn translated(from: &gltf::Material<'_>) -> Material {
     let pbr = from.pbr_metallic_roughness();
     let [r, g, b, alpha] = pbr.base_color_factor();
@@ -557,35 +554,16 @@ fn translated(from: &gltf::Material<'_>) -> Material {
     if from.unlit() {
         return Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission: base, ..Material::MATT };
     }
-    let (metal, rough) = (pbr.metallic_factor(), pbr.roughness_factor());
-    let smooth = (1.0 - rough) * (1.0 - rough);
-    let through = from.transmission().map_or(0.0, |t| t.transmission_factor()) * (1.0 - metal);
-    let ior = from.ior().unwrap_or(1.5);
-    let normal_incidence = ((ior - 1.0) / (ior + 1.0)) * ((ior - 1.0) / (ior + 1.0));
-    let seen = if from.alpha_mode() == AlphaMode::Blend { alpha } else { 1.0 };
-    let emission = from.emissive_factor().map(|c| c * from.emissive_strength().unwrap_or(1.0));
-
-    let diffuse = base.map(|c| c * seen * ((1.0 - metal) * (1.0 - through) + metal * (1.0 - smooth)));
-    let mirror = base.map(|c| c * seen * metal * smooth);
-    // Blinn's exponent for a width of roughness squared, and the height that keeps the highlight's light the same.
-    let width = rough * rough;
-    let exponent = (2.0 / (width * width).max(1e-9) - 2.0).min(EXPONENT_MAX);
-    let height = (exponent + 8.0) / 8.0;
-    let specular = base.map(|c| seen * height * (normal_incidence * (1.0 - metal) + c * metal));
-    let shines = exponent > 0.0 && specular.iter().any(|&c| c > 0.0);
-    let glass = through > 0.0;
-    Material {
-        diffuse,
-        ambient: diffuse,
-        emission: emission.map(|c| c * seen),
-        specular: if shines { specular } else { [0.0; 3] },
-        mirror,
-        transmission: base.map(|c| if glass { c * through * seen } else { 1.0 - seen }),
-        exponent: if shines { exponent } else { 0.0 },
-        ior: if glass { ior.max(1.0) } else { 1.0 },
-        highlight: if shines { Highlight::Blinn } else { Highlight::None } as u32,
-        flags: if glass { Material::FRESNEL } else { 0 },
-    }
+    let physical = Physical {
+        base,
+        metal: pbr.metallic_factor(),
+        rough: pbr.roughness_factor(),
+        through: from.transmission().map_or(0.0, |t| t.transmission_factor()),
+        ior: from.ior().unwrap_or(1.5),
+        seen: if from.alpha_mode() == AlphaMode::Blend { alpha } else { 1.0 },
+        emission: from.emissive_factor().map(|c| c * from.emissive_strength().unwrap_or(1.0)),
+    };
+    physical.material()
 }
 
 #[cfg(test)]

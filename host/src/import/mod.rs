@@ -11,6 +11,7 @@ mod meshes;
 mod mtl;
 mod nff;
 mod obj;
+mod physical;
 mod ply;
 mod polygon;
 mod scene_toml;

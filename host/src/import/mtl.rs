@@ -2,7 +2,7 @@
 //!
 //! `tobj` panics where a colour has fewer than three numbers and takes NaN for a number. So each statement is checked
 //! first, and what `tobj` gets to parse is the file with every number in range, `Kd 0.5` written out as
-//! `Kd 0.5 0.5 0.5`, and without what is not honoured (textures, physically based fields), which is warned of.
+//! `Kd 0.5 0.5 0.5`, and without what is not honoured (textures, sheen, coats), which is warned of.
 //!
 //! | `illum` | in Hybray |
 //! |---|---|
@@ -22,10 +22,14 @@
 //! In the others `d` below 1 dissolves the surface: light passes straight on with weight `1 - d`, all else is
 //! multiplied by `d`, and `Tf` means nothing, because exporters write it for opaque surfaces. Without `Kd` a surface is
 //! the default's grey; without `Ka` it reflects ambient light as it does direct light. Numbers are taken as linear.
+//!
+//! Where roughness `Pr` or metalness `Pm` is given, those go before `Ks`, `Ns` and `Ka`: the base colour is `Kd`, `illum` says only whether
+//! it is glass, and `Ni` and `d` mean what they do. Without `Pr` the roughness is that of `Ns`.
 
 use super::error::{ImportError, Warnings, quote};
 use super::guarded;
 use super::lines::{Lines, without_comment};
+use super::physical::Physical;
 use hybray_shading::{Highlight, Material};
 use std::fmt::Write as _;
 use std::io::BufRead;
@@ -93,7 +97,7 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
                 };
                 let _ = writeln!(out, "{key} {r} {g} {b}");
             }
-            "Ns" | "Ni" | "d" | "Tr" => {
+            "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" => {
                 let rest = match rest.strip_prefix("-halo") {
                     Some(rest) if key == "d" => {
                         warnings.add(number, "`d -halo` is taken as `d`");
@@ -102,7 +106,7 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
                     _ => rest,
                 };
                 let (within, range): (fn(f32) -> bool, _) = match key {
-                    "d" | "Tr" => (|c| (0.0..=1.0).contains(&c), "a number from 0 to 1"),
+                    "d" | "Tr" | "Pr" | "Pm" => (|c| (0.0..=1.0).contains(&c), "a number from 0 to 1"),
                     _ => (|c| c >= 0.0, "a number of 0 and up"),
                 };
                 let first = rest.split_whitespace().next().unwrap_or("");
@@ -132,7 +136,7 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
         if !honoured {
             let lower = key.to_ascii_lowercase();
             let texture = lower.starts_with("map_") || ["bump", "disp", "decal", "refl", "norm"].contains(&&*lower);
-            let physical = ["pr", "pm", "ps", "pc", "pcr", "aniso", "anisor"].contains(&&*lower);
+            let physical = ["ps", "pc", "pcr", "aniso", "anisor"].contains(&&*lower);
             let what = match (texture, physical) {
                 (true, _) => "a texture, is not used",
                 (_, true) => "of physically based shading, is not used",
@@ -179,8 +183,23 @@ fn material(m: &tobj::Material) -> Material {
         return Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission, ..Material::MATT };
     }
     let exponent = m.shininess.unwrap_or(0.0);
-    let shines = illum >= 2 && exponent > 0.0 && specular.iter().any(|&c| c > 0.0);
     let glass = matches!(illum, 4 | 6 | 7 | 9);
+    let (metal, rough) = (extra("Pm"), extra("Pr"));
+    if metal.is_some() || rough.is_some() {
+        let rest = opacity.unwrap_or(if glass { 0.0 } else { 1.0 });
+        return Physical {
+            base: diffuse,
+            metal: metal.map_or(0.0, |m| m[0]),
+            // Of an exponent: see `Physical::material`, the other way round.
+            rough: rough.map_or_else(|| libm::sqrtf(libm::sqrtf(2.0 / (exponent + 2.0))), |r| r[0]),
+            through: if glass { 1.0 - rest } else { 0.0 },
+            ior: m.optical_density.unwrap_or(1.5),
+            seen: if glass { 1.0 } else { rest },
+            emission,
+        }
+        .material();
+    }
+    let shines = illum >= 2 && exponent > 0.0 && specular.iter().any(|&c| c > 0.0);
     let transmission = match opacity {
         _ if glass && extra("Tf").is_some() => extra("Tf").unwrap_or_default(),
         Some(d) => [1.0 - d; 3],
@@ -269,6 +288,23 @@ mod tests {
     }
 
     #[test]
+    fn roughness_and_metalness_go_before_the_older_fields() {
+        let metal = one("Kd 1 0.5 0\nKs 1\nNs 500\nPr 0\nPm 1\nillum 2");
+        assert_eq!((metal.mirror, metal.diffuse), ([1.0, 0.5, 0.0], [0.0; 3]));
+        let matt = one("Kd 0.5\nKs 1\nNs 500\nPr 1\nillum 2");
+        assert_eq!(matt, Material { diffuse: [0.5; 3], ambient: [0.5; 3], ..Material::MATT });
+        // The exponent gives the roughness back.
+        let shiny = one("Kd 0.5\nNs 30\nPm 0.25");
+        assert!((shiny.exponent - 30.0).abs() < 1e-3, "{}", shiny.exponent);
+        let glass = one("Kd 1\nNi 1.3\nPr 0\nillum 7");
+        assert_eq!((glass.transmission, glass.ior, glass.flags), ([1.0; 3], 1.3, Material::FRESNEL));
+        let half = one("Kd 1\nPr 1\nd 0.5");
+        assert_eq!((half.diffuse, half.transmission), ([0.5; 3], [0.5; 3]));
+        let error = parse("newmtl a\n\nPr 1.5").expect_err("too rough");
+        assert_eq!(error, "m.mtl:3: Pr `1.5` is not allowed; give a number from 0 to 1");
+    }
+
+    #[test]
     fn names_and_order() {
         let (found, _) = parse("newmtl red one\nnewmtl b\r\nKd 1 0 0\nnewmtl b").expect("reads");
         let names: Vec<&str> = found.iter().map(|(n, _)| n.as_str()).collect();
@@ -279,14 +315,14 @@ mod tests {
 
     #[test]
     fn what_is_not_honoured_is_warned_of_once() {
-        let body = "Kd 1 1 1\nnewmtl a\nmap_Kd a.png\nmap_Kd\nPr 0.5\nbump x\nfoo 1\nd -halo 1\nKd spectral a.rfl\nNi 0\nillum 10";
+        let body = "Kd 1 1 1\nnewmtl a\nmap_Kd a.png\nmap_Kd\nPs 0.5\nbump x\nfoo 1\nd -halo 1\nKd spectral a.rfl\nNi 0\nillum 10";
         let (_, warnings) = parse(body).expect("reads");
         assert_eq!(
             warnings,
             [
                 "m.mtl:1: what stands before the first `newmtl` is not used",
                 "m.mtl:3: `map_Kd`, a texture, is not used (2 times, here first)",
-                "m.mtl:5: `Pr`, of physically based shading, is not used",
+                "m.mtl:5: `Ps`, of physically based shading, is not used",
                 "m.mtl:6: `bump`, a texture, is not used",
                 "m.mtl:7: `foo`, is not known here and not used",
                 "m.mtl:8: `d -halo` is taken as `d`",
