@@ -64,6 +64,7 @@ pub(super) fn read(bytes: &[u8], file: &str, folder: &Path) -> Result<Model, Imp
         materials: BTreeMap::new(),
         used: BTreeSet::new(),
         stored: 0,
+        made: 0,
     };
     match guarded(|| reader.scene()) {
         Some(done) => done?,
@@ -256,6 +257,8 @@ struct Reader<'a> {
     used: BTreeSet<usize>,
     /// Triangles of those.
     stored: u64,
+    /// Vertices and corners so far, each use counted.
+    made: u64,
 }
 
 impl Reader<'_> {
@@ -323,10 +326,6 @@ impl Reader<'_> {
             }
             let (normals_place, mirrored) = place.normals();
             let Some((positions, normals, triangles)) = self.triangles(&primitive, &what)? else { continue };
-            if !is_new && self.model.objects.polygons + triangles.len() as u64 > COPIES_MAX {
-                let problem = format!("uses of {what} make more than {COPIES_MAX} triangles");
-                return Err(self.error(problem, "leave some of them out"));
-            }
             let material = self.material(&primitive)?;
             let Some(material) = material else { continue };
             let placed: Vec<[f32; 3]> = positions.iter().map(|&p| place.point(p)).collect();
@@ -359,7 +358,7 @@ type Corners = (Points, Points, Vec<[u32; 3]>);
 
 impl Reader<'_> {
     /// What a primitive holds; `None` if nothing.
-    fn triangles(&self, primitive: &gltf::Primitive<'_>, what: &str) -> Result<Option<Corners>, ImportError> {
+    fn triangles(&mut self, primitive: &gltf::Primitive<'_>, what: &str) -> Result<Option<Corners>, ImportError> {
         let Some(positions) = primitive.get(&gltf::Semantic::Positions) else { return Ok(None) };
         self.check(&positions, &[DataType::F32], Dimensions::Vec3, what)?;
         let count = positions.count();
@@ -373,6 +372,14 @@ impl Reader<'_> {
         }
         if let Some(indices) = primitive.indices() {
             self.check(&indices, &[DataType::U8, DataType::U16, DataType::U32], Dimensions::Scalar, what)?;
+        }
+        // A file may name the same bytes again and again.
+        self.made += (count + primitive.indices().map_or(count, |indices| indices.count())) as u64;
+        let bytes: usize = self.buffers.iter().map(Vec::len).sum();
+        if self.made > MADE_MAX.max(2 * bytes as u64) {
+            let problem =
+                format!("{what} and what comes before it make more than {MADE_MAX} corners of the same bytes");
+            return Err(self.error(problem, "leave some of it out"));
         }
         let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
         let unreadable = || self.error(format!("{what} cannot be read"), "export the file again");
@@ -540,11 +547,11 @@ impl Reader<'_> {
     }
 }
 
-/// Triangles that a scene may have when another use of a mesh adds to them: some 4 GB.
-const COPIES_MAX: u64 = 1 << 26;
+/// Vertices and corners that a scene may have, if its buffers have not more bytes than that: a GB or two.
+const MADE_MAX: u64 = 1 << 26;
 
 /// Values of an accessor that has no bytes but for its sparse part.
-const UNSTORED_MAX: usize = 1 << 24;
+const UNSTORED_MAX: usize = 1 << 20;
 
 /// A material in Whitted's model: see [`Physical`].
 fn translated(from: &gltf::Material<'_>) -> Material {

@@ -192,6 +192,13 @@ fn what_is_wrong_is_said() {
     );
     check(&|s| s["accessors"][0]["sparse"]["count"] = json!(2), "mesh 0 (`quad`), accessor 0: its 2 sparse values");
     check(&|s| s["accessors"][1]["componentType"] = json!(5122), "mesh 0 (`quad`), accessor 1: Vec3 of I16 is not");
+    let again = |s: &mut Value| {
+        s["accessors"][0] = json!({"componentType": 5126, "count": 1 << 20, "type": "VEC3", "sparse": {
+            "count": 1, "indices": {"bufferView": 3, "componentType": 5121}, "values": {"bufferView": 2}}});
+        let primitive = json!({"attributes": {"POSITION": 0}, "indices": 2});
+        s["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
+    };
+    check(&again, "mesh 0 (`quad`) and what comes before it make more than 67108864 corners of the same bytes");
     let fewer = |s: &mut Value| (0..2).for_each(|i| s["accessors"][i]["count"] = json!(3));
     check(&fewer, "mesh 0 (`quad`) names vertex 3 of 3");
     let error = read(&glb(&scene())[..300], "a.glb", Path::new("")).expect_err("cut").to_string();
