@@ -154,7 +154,7 @@ mod tests {
         let positions = vec![low, high, [low[0], high[1], low[2]], [1e9; 3]];
         model.meshes.push(Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() });
         let material = Material { ambient: [1.0; 3], ..Material::MATT };
-        model.materials.push(NamedMaterial { name: "m".to_owned(), material });
+        model.materials.push(NamedMaterial { name: "m".to_owned(), material, ..Default::default() });
         model
     }
 

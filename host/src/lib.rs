@@ -15,3 +15,4 @@ pub mod picture;
 pub mod prepare;
 pub mod program;
 pub mod simulate;
+pub mod texture;

@@ -3,7 +3,8 @@
 //! Coordinates are the file's own, in `f32`. Primitive ids follow from the order here: the triangles of each mesh in
 //! turn, then spheres, then cones.
 
-use hybray_shading::{Light, Material};
+use crate::texture::Texture;
+use hybray_shading::{Light, Map, Maps, Material};
 
 /// Triangles that share a material and whether they have vertex normals.
 #[derive(Clone, Debug, Default)]
@@ -14,6 +15,10 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// Empty, or one unit normal for each vertex.
     pub normals: Vec<[f32; 3]>,
+    /// Empty, or texture coordinates of each vertex: v counts from a picture's top down.
+    pub coordinates: Vec<[f32; 2]>,
+    /// Empty, or a colour of each vertex: red, green and blue encoded as sRGB, and coverage.
+    pub colours: Vec<[u8; 4]>,
     /// Vertex indices, counterclockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Model::materials`].
@@ -47,12 +52,20 @@ pub struct Cone {
 }
 
 /// A material with the name that its file gives it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct NamedMaterial {
     /// Name, or empty.
     pub name: String,
     /// What a node holds of it.
     pub material: Material,
+    /// What it takes from textures; looked at if it has [`Material::DETAIL`].
+    pub maps: Maps,
+}
+
+impl Default for NamedMaterial {
+    fn default() -> Self {
+        Self { name: String::new(), material: Material::default(), maps: Maps::EMPTY }
+    }
 }
 
 /// A pinhole camera.
@@ -117,6 +130,12 @@ pub struct Model {
     pub cones: Vec<Cone>,
     /// At least one if there are primitives; at most 65,535.
     pub materials: Vec<NamedMaterial>,
+    /// Pictures on surfaces.
+    pub textures: Vec<Texture>,
+    /// How materials use them.
+    pub uses: Vec<Map>,
+    /// Triangles that the file itself has, where it uses a mesh more than once.
+    pub stored_triangles: Option<u64>,
     /// Lights; empty if the file has none (a default is then made).
     pub lights: Vec<Light>,
     /// Cameras; empty if the file has none (the model is then framed).
@@ -140,14 +159,47 @@ impl Model {
         self.meshes.iter().map(|m| m.triangles.len()).sum::<usize>() + self.spheres.len() + self.cones.len()
     }
 
+    /// What each material takes from textures; empty if none takes anything.
+    #[must_use]
+    pub fn maps(&self) -> Vec<Maps> {
+        let detailed = self.materials.iter().any(|m| m.material.flags & Material::DETAIL != 0);
+        self.materials.iter().filter(|_| detailed).map(|m| m.maps).collect()
+    }
+
+    /// Adds a texture and returns its index; one that shows the same is used again.
+    pub fn add_texture(&mut self, texture: Texture) -> u32 {
+        let found = self.textures.iter().position(|t| t.is_same(&texture));
+        found.unwrap_or_else(|| {
+            self.textures.push(texture);
+            self.textures.len() - 1
+        }) as u32
+    }
+
+    /// Adds a use of a texture, and returns its index; an equal one is used again. [`Maps::NONE`] if there are too many.
+    pub fn add_use(&mut self, map: Map) -> u16 {
+        let index = self.uses.iter().position(|m| *m == map).unwrap_or_else(|| {
+            self.uses.push(map);
+            self.uses.len() - 1
+        });
+        u16::try_from(index).unwrap_or(Maps::NONE)
+    }
+
     /// Adds a material and returns its index; an equal one of the same name is used again.
     ///
     /// # Panics
     /// If there are 65,535 already: importers check first.
     pub fn add_material(&mut self, name: &str, material: Material) -> u16 {
-        let found = self.materials.iter().rposition(|m| m.name == name && m.material == material);
-        let index = found.unwrap_or_else(|| {
-            self.materials.push(NamedMaterial { name: name.to_owned(), material });
+        self.add_mapped_material(name, material, Maps::EMPTY)
+    }
+
+    /// The same with what it takes from textures.
+    ///
+    /// # Panics
+    /// As [`Model::add_material`].
+    pub fn add_mapped_material(&mut self, name: &str, material: Material, maps: Maps) -> u16 {
+        let same = |m: &NamedMaterial| m.name == name && m.material == material && m.maps == maps;
+        let index = self.materials.iter().rposition(same).unwrap_or_else(|| {
+            self.materials.push(NamedMaterial { name: name.to_owned(), material, maps });
             self.materials.len() - 1
         });
         u16::try_from(index).expect("at most 65,535 materials")

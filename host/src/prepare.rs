@@ -6,7 +6,7 @@ use crate::framing;
 use crate::model::{CameraSpec, Model, Objects, Settings};
 use crate::pack::{self, HybError, Packing};
 use hybray_scheduler::Step;
-use hybray_shading::{Filter, Light, LightKind, Material, spawn};
+use hybray_shading::{Filter, Light, LightKind, Map, MapTables, Maps, Material, spawn};
 use hybray_tracer::Scene;
 use hybray_wire::Frame;
 use std::path::Path;
@@ -27,6 +27,8 @@ pub struct Prepared {
     pub packed: Packed,
     materials: Vec<Material>,
     lights: Vec<Light>,
+    maps: Vec<Maps>,
+    uses: Vec<Map>,
     ambient: [f32; 3],
     background: [f32; 3],
     /// Cameras, in file units.
@@ -90,11 +92,14 @@ impl Prepared {
             })
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
+        let maps = model.maps();
         let mut prepared = Self {
             hash: 0,
             packed,
             materials,
             lights,
+            maps,
+            uses: model.uses,
             ambient: model.ambient,
             background: model.background,
             cameras: model.cameras,
@@ -113,15 +118,23 @@ impl Prepared {
     /// Adds to a hash what nodes know of the scene besides pages.
     fn hash_tables(&self, hash: u64) -> u64 {
         let colours = [self.ambient, self.background];
-        let tables: [&[u8]; 3] =
-            [bytemuck::cast_slice(&self.materials), bytemuck::cast_slice(&self.lights), bytemuck::cast_slice(&colours)];
-        tables.into_iter().fold(hash, build::hash_bytes)
+        let tables: [&[u8]; 5] = [
+            bytemuck::cast_slice(&self.materials),
+            bytemuck::cast_slice(&self.lights),
+            bytemuck::cast_slice(&colours),
+            bytemuck::cast_slice(&self.maps),
+            bytemuck::cast_slice(&self.uses),
+        ];
+        // What a scene does not have changes nothing.
+        let count = if self.maps.is_empty() && self.uses.is_empty() { 3 } else { 5 };
+        tables.into_iter().take(count).fold(hash, build::hash_bytes)
     }
 
     /// What a film of `frame` is of: the same for all trees, page sizes and voxels, as the picture is.
     #[must_use]
     pub fn subject(&self, pages: &Pages<'_>, frame: &Frame) -> Subject {
         let primitives = build::hash_bytes(pages.hash_primitives(), &self.packed.scale_log2.to_le_bytes());
+        let primitives = pages.hash_textures(primitives);
         Subject { scene: self.hash_tables(primitives), frame: *frame }
     }
 
@@ -138,7 +151,10 @@ impl Prepared {
             (!self.lights.is_empty(), "shadow rays"),
             (self.lights.iter().any(area), "area lights"),
             (self.materials.iter().any(Material::mirrors), "mirrored rays"),
-            (self.materials.iter().any(Material::transmits), "refracted rays"),
+            (self.materials.iter().any(Material::refracts), "refracted rays"),
+            (self.materials.iter().any(|m| m.flags & Material::PHYSICAL != 0), "sampled reflection"),
+            (self.materials.iter().any(|m| m.flags & Material::CUTOUT != 0), "cut-outs"),
+            (!self.packed.textures.is_empty(), "textures"),
         ]
         .into_iter()
         .filter_map(|(required, what)| required.then_some(what))
@@ -154,7 +170,8 @@ impl Prepared {
     /// Bytes of the tables that every node has.
     #[must_use]
     pub fn table_bytes(&self) -> u64 {
-        (size_of_val(&self.materials[..]) + size_of_val(&self.lights[..])) as u64
+        let maps = size_of_val(&self.maps[..]) + size_of_val(&self.uses[..]) + size_of_val(&self.packed.textures[..]);
+        (size_of_val(&self.materials[..]) + size_of_val(&self.lights[..]) + maps) as u64
     }
 
     /// What nodes need, over opened `pages`.
@@ -170,10 +187,12 @@ impl Prepared {
                 weight_cutoff: CUTOFF,
                 distance_scale: libm::ldexpf(1.0, -self.packed.scale_log2),
                 shadow_rays: spawn::shadow_rays(&self.lights),
+                maps: MapTables { maps: &self.maps, uses: &self.uses, textures: &self.packed.textures },
             },
             background: self.background,
             magnitude: self.packed.magnitude,
             transmits: self.materials.iter().any(Material::transmits),
+            texels: pages.texels(),
         }
     }
 

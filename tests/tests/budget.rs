@@ -166,7 +166,17 @@ fn a_refusal_says_what_would_do() {
         let pages_bytes = (pages_bytes * pages as u64 / pages.min(64) as u64 / LINE * LINE).max(page_bytes_max as u64);
         let directory_nodes = 1 + pages / 4;
         let (materials, lights) = (random.below(100), random.below(40));
-        let sizes = Sizes { pages, pages_bytes, page_bytes_max, directory_nodes, materials, lights };
+        let (maps, texel_pages_of_a_hit) = ([random.below(30); 3], 2 * random.below(5));
+        let sizes = Sizes {
+            pages,
+            pages_bytes,
+            page_bytes_max,
+            directory_nodes,
+            materials,
+            lights,
+            maps,
+            texel_pages_of_a_hit,
+        };
         let (nodes, policy) = (1 + random.below(1 << nodes_log2) as u16, Policy::ALL[random.below(4)].1);
         let memory = random.bits() % (1 << (10 + random.below(20)));
         let plan = |nodes, memory| Plan::new(sizes, nodes, memory, None, policy);

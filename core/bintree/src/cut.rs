@@ -6,8 +6,8 @@ use crate::collapse::{Binary, Forest, Full, above, apiece, collapse};
 use bytemuck::{Pod, Zeroable};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle};
 use hybray_scene::{
-    BLOCK, Child, CompactNode, CompactTriangles, ConeRecord, Header, Kind, Line, Node, PAGE_BYTES_MAX, PageForm,
-    SphereBlock, TriangleBlock, WIDTH, lines_for,
+    BLOCK, Child, Colours, CompactNode, CompactTriangles, ConeRecord, Coordinates, Header, Kind, Line, Node,
+    PAGE_BYTES_MAX, PageForm, SphereBlock, TriangleBlock, WIDTH, lines_for,
 };
 
 /// The caller's primitives, by [`Item::id`].
@@ -26,6 +26,19 @@ pub trait Primitives {
     fn material(&self, id: u32) -> u16;
     /// The packed vertex normals of triangle `id`, if it has them.
     fn normals(&self, id: u32) -> Option<[u32; 3]>;
+    /// The texture coordinates of the corners of triangle `id`, if it has them.
+    fn coordinates(&self, _id: u32) -> Option<Coordinates> {
+        None
+    }
+    /// The colours of the corners of triangle `id`, if it has them.
+    fn colours(&self, _id: u32) -> Option<Colours> {
+        None
+    }
+    /// What a triangle has besides corners, normals and a material, as [`Header::attributes`] says it.
+    fn attributes(&self, id: u32) -> u32 {
+        let coordinates = if self.coordinates(id).is_some() { Header::COORDINATES } else { 0 };
+        coordinates | if self.colours(id).is_some() { Header::COLOURS } else { 0 }
+    }
 }
 
 /// Leaves that a page may hold: the least is a block of compact triangles.
@@ -238,6 +251,9 @@ impl<P: Primitives> Binary for Filling<'_, P> {
         let (so_far, count) = match kind {
             Kind::Triangle => {
                 self.smooth = self.smooth || items.iter().any(|item| self.source.normals(item.id).is_some());
+                for item in items {
+                    self.counts.attributes |= self.source.attributes(item.id);
+                }
                 (&mut self.counts.triangle_blocks, items.len().div_ceil(BLOCK) as u32)
             }
             Kind::Sphere => (&mut self.counts.sphere_blocks, items.len().div_ceil(BLOCK) as u32),
@@ -362,6 +378,18 @@ fn fill<P: Primitives>(
             take(rest, header.normals).copy_from_slice(&normals[..header.normals as usize]);
         }
     }
+    if header.attributes & Header::COORDINATES != 0 {
+        let all = take::<Coordinates>(rest, header.triangle_blocks * BLOCK as u32);
+        for (to, id) in all.iter_mut().zip(of_kind(Kind::Triangle)) {
+            *to = source.coordinates(id).unwrap_or_default();
+        }
+    }
+    if header.attributes & Header::COLOURS != 0 {
+        let all = take::<Colours>(rest, header.triangle_blocks * BLOCK as u32);
+        for (to, id) in all.iter_mut().zip(of_kind(Kind::Triangle)) {
+            *to = source.colours(id).unwrap_or([[u8::MAX; 4]; 3]);
+        }
+    }
     for (to, material) in take(rest, header.materials).iter_mut().zip(materials()) {
         *to = material;
     }
@@ -392,6 +420,9 @@ fn least_bytes<P: Primitives>(subject: &Subject<'_>, part: &Part, source: &P, fo
                 Kind::Triangle => {
                     // One of a kind is enough: where a triangle has normals, all have room for them.
                     smooth = smooth || least.triangle_blocks == 0 && source.normals(items[0].id).is_some();
+                    if least.triangle_blocks == 0 {
+                        least.attributes = source.attributes(items[0].id);
+                    }
                     least.triangle_blocks += blocks;
                 }
                 Kind::Sphere => least.sphere_blocks += blocks,

@@ -52,6 +52,8 @@ pub struct Counts {
     pub blocks: u64,
     /// Pages that were entered.
     pub pages: u64,
+    /// Bilinear look-ups in textures, for the hits.
+    pub look_ups: u64,
 }
 
 impl core::ops::AddAssign for Counts {
@@ -59,6 +61,7 @@ impl core::ops::AddAssign for Counts {
         self.nodes += b.nodes;
         self.blocks += b.blocks;
         self.pages += b.pages;
+        self.look_ups += b.look_ups;
     }
 }
 

@@ -1,7 +1,7 @@
 //! The directory: wide nodes over all pages, small enough for every node.
 
 use crate::page::check_nodes;
-use crate::{Child, Node, PAGE_BYTES_MAX, PageView, WIDTH};
+use crate::{Child, Node, PAGE_BYTES_MAX, PageView, Texels, WIDTH};
 use bytemuck::{Pod, Zeroable};
 
 /// What is known of a page everywhere. Its box stands in the directory's nodes.
@@ -12,8 +12,15 @@ pub struct PageEntry {
     pub bytes: u32,
     /// The node that keeps it.
     pub owner: u16,
-    /// 0: geometry.
+    /// [`PageEntry::GEOMETRY`] or [`PageEntry::TEXELS`].
     pub kind: u16,
+}
+
+impl PageEntry {
+    /// Nodes and primitives: a node of the directory leads to it. These pages come first.
+    pub const GEOMETRY: u16 = 0;
+    /// Texels: textures' tables lead to it.
+    pub const TEXELS: u16 = 1;
 }
 
 const _: () = assert!(core::mem::size_of::<PageEntry>() == 8);
@@ -68,6 +75,11 @@ pub trait Pages {
     #[inline(always)]
     fn nearest(&self, number: u32) -> Option<PageView<'_>> {
         self.page(number)
+    }
+
+    /// The page, if it is one of texels and at hand.
+    fn texels(&self, _number: u32) -> Option<Texels<'_>> {
+        None
     }
 
     /// [`parents`] of the directory: what a walk needs to go on from a page. May be empty where every page is at hand.
@@ -139,9 +151,18 @@ impl<'a> Directory<'a> {
         if let Some(page) = twice {
             return Err(DirectoryError::Page { page, what: "it is led to more than once" });
         }
-        match led_to.iter().position(|&times| times == 0) {
-            Some(page) => Err(DirectoryError::Page { page, what: "no node leads to it" }),
-            None => Ok(Self { nodes, entries }),
+        let mut last = PageEntry::GEOMETRY;
+        for (page, (entry, times)) in entries.iter().zip(led_to).enumerate() {
+            let before = core::mem::replace(&mut last, entry.kind);
+            let what = match (entry.kind, times) {
+                (PageEntry::GEOMETRY, 1) if before == PageEntry::TEXELS => "it comes after one with texels",
+                (PageEntry::GEOMETRY, 1) | (PageEntry::TEXELS, 0) => continue,
+                (PageEntry::GEOMETRY, _) => "no node leads to it",
+                (PageEntry::TEXELS, _) => "a node leads to it, and it has texels",
+                _ => "it is of a kind that is not known here",
+            };
+            return Err(DirectoryError::Page { page, what });
         }
+        Ok(Self { nodes, entries })
     }
 }

@@ -23,7 +23,8 @@ pub const fn lines_for(bytes: usize) -> usize {
 }
 
 /// First 64 bytes of a page. The arrays follow without gaps: in the full form nodes, triangles, spheres, cones, normals,
-/// materials; in the compact one nodes, spheres, triangles, cones, vertices, normals, materials.
+/// texture coordinates, colours, materials; in the compact one nodes, spheres, triangles, cones, vertices, normals, texture
+/// coordinates, colours, materials.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
@@ -49,8 +50,8 @@ pub struct Header {
     pub hi: [f32; 3],
     /// Vertices of a compact page.
     pub vertices: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// What else stands with each triangle lane: [`Header::COORDINATES`], [`Header::COLOURS`].
+    pub attributes: u32,
 }
 
 const _: () = assert!(core::mem::size_of::<Header>() == 64);
@@ -60,12 +61,22 @@ impl Header {
     pub const MAGIC: u32 = u32::from_le_bytes(*b"hyP\x01");
     /// "hyC" and the version of the format: a compact page.
     pub const MAGIC_COMPACT: u32 = u32::from_le_bytes(*b"hyC\x01");
+    /// Texture coordinates of the three corners of each triangle lane.
+    pub const COORDINATES: u32 = 1;
+    /// Colours of the three corners of each triangle lane.
+    pub const COLOURS: u32 = 2;
 
     /// The form that the magic tells.
     #[must_use]
     #[inline(always)]
     pub const fn form(&self) -> PageForm {
         if self.magic == Self::MAGIC_COMPACT { PageForm::Compact } else { PageForm::Full }
+    }
+
+    /// Triangle lanes if these attributes stand with each, else 0.
+    #[must_use]
+    const fn lanes_with(&self, attribute: u32) -> u32 {
+        if self.attributes & attribute == 0 { 0 } else { self.triangle_blocks * BLOCK as u32 }
     }
 
     /// Bytes of a page with these counts.
@@ -82,6 +93,8 @@ impl Header {
             + self.cones as u64 * size_of::<ConeRecord>() as u64
             + vertices * 12
             + self.normals as u64 * normal
+            + self.lanes_with(Self::COORDINATES) as u64 * size_of::<Coordinates>() as u64
+            + self.lanes_with(Self::COLOURS) as u64 * size_of::<Colours>() as u64
             + self.materials as u64 * 2
     }
 
@@ -91,6 +104,11 @@ impl Header {
         (self.triangle_blocks + self.sphere_blocks) * BLOCK as u32 + self.cones
     }
 }
+
+/// Texture coordinates of a triangle's corners: u, and v from the top of the picture down.
+pub type Coordinates = [[f32; 2]; 3];
+/// Colours of a triangle's corners: red, green and blue encoded as sRGB, and coverage.
+pub type Colours = [[u8; 4]; 3];
 
 /// Lengths of the tables that pages refer to, for validation.
 #[derive(Clone, Copy, Debug)]
@@ -146,6 +164,10 @@ pub struct PageView<'a> {
     pub spheres: &'a [SphereBlock],
     /// Cones.
     pub cones: &'a [ConeRecord],
+    /// Of each triangle lane; or empty.
+    pub coordinates: &'a [Coordinates],
+    /// Of each triangle lane; or empty.
+    pub colours: &'a [Colours],
     /// One for all, or one for each slot.
     pub materials: &'a [u16],
 }
@@ -183,6 +205,9 @@ impl<'a> PageView<'a> {
         }
         if needed > all.len() as u64 {
             return Err(short(needed));
+        }
+        if header.attributes & !(Header::COORDINATES | Header::COLOURS) != 0 {
+            return Err(PageError::Header("attributes that are not known here"));
         }
         if header.nodes == 0 {
             return Err(PageError::Header("no root"));
@@ -282,6 +307,8 @@ impl<'a> PageView<'a> {
             body,
             spheres: bytemuck::cast_slice(spheres),
             cones: bytemuck::cast_slice(cones),
+            coordinates: bytemuck::cast_slice(take(header.lanes_with(Header::COORDINATES), size_of::<Coordinates>())),
+            colours: bytemuck::cast_slice(take(header.lanes_with(Header::COLOURS), size_of::<Colours>())),
             materials: bytemuck::cast_slice(take(header.materials, 2)),
         }
     }

@@ -167,7 +167,7 @@ fn main() {
             threads.spawn(move || {
                 let mut lent = Box::new_uninit_slice(bytes);
                 let memory = NodeMemory::carve(&mut Arena::new(&mut lent), &limits).expect("the sum of its terms");
-                let (store, settings) = (All(scene.resident.pages), Settings::default());
+                let (store, settings) = (All(scene.resident.pages, &[]), Settings::default());
                 let mut node =
                     Node::new(scene, store, SCENE_HASH, Kernels::Portable, link.me(), HOST, settings, memory);
                 work(&mut node, &mut link, &mut { clock });

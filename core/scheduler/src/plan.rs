@@ -8,11 +8,11 @@ use crate::policy::Policy;
 use hybray_arena::{Arena, Short, Sum};
 use hybray_bintree::walk::Resident;
 use hybray_scene::{Directory, Line, Node as TreeNode, PageEntry, PageView, Tables, lines_for, parents};
-use hybray_shading::{Light, Material};
+use hybray_shading::{Light, Map, MapTables, Maps, Material, Texture};
 use hybray_tracer::Scene;
 
 /// What of a scene takes memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
     /// Pages.
     pub pages: usize,
@@ -26,6 +26,10 @@ pub struct Sizes {
     pub materials: usize,
     /// Lights.
     pub lights: usize,
+    /// What materials take from textures, uses of textures, and textures: all 0 for a scene without.
+    pub maps: [usize; 3],
+    /// Texel pages that one hit needs at most.
+    pub texel_pages_of_a_hit: usize,
 }
 
 impl Sizes {
@@ -41,7 +45,20 @@ impl Sizes {
             directory_nodes: directory.nodes.len(),
             materials: scene.shading.materials.len(),
             lights: scene.shading.lights.len(),
+            maps: [scene.shading.maps.maps.len(), scene.shading.maps.uses.len(), scene.shading.maps.textures.len()],
+            texel_pages_of_a_hit: scene.shading.maps.pages_of_a_hit(),
         }
+    }
+
+    /// Places of a cache that are the lane's: for a page of the directory, and for the texels that a hit needs.
+    #[must_use]
+    pub const fn lane_places(&self) -> usize {
+        1 + self.texel_pages_of_a_hit
+    }
+
+    /// Places of a cache at least: one, and the lane's.
+    const fn places_min(&self) -> usize {
+        1 + self.lane_places()
     }
 
     /// Bytes of pages that a node owns at most where shares are even: one page more than the mean.
@@ -76,8 +93,6 @@ pub enum PlanError {
     },
 }
 
-/// Places of the cache at least: one, and the lane's.
-const PLACES_MIN: usize = 2;
 /// Shares of the budget, and what they are kept within.
 const TILES: (u64, u64, u64) = (64, 8, 256);
 const RAYS: (u64, u64, u64) = (16, 256, 16_384);
@@ -143,11 +158,12 @@ impl Plan {
         let keeps_others = matches!(policy, Policy::Hybrid | Policy::DemandDriven);
         plan.holds_all = keeps_others && room >= sizes.pages_bytes;
         if plan.holds_all {
-            plan.lines = PLACES_MIN * place_lines + (sizes.pages_bytes / line) as usize;
+            plan.lines = sizes.places_min() * place_lines + (sizes.pages_bytes / line) as usize;
         } else {
             let free = room - owned;
-            if policy != Policy::DataParallel {
-                plan.places = PLACES_MIN + ((free / plan.place_bytes()) as usize).min(sizes.pages);
+            // Texels are fetched, whatever the policy.
+            if policy != Policy::DataParallel || sizes.texel_pages_of_a_hit > 0 {
+                plan.places = sizes.places_min() + ((free / plan.place_bytes()) as usize).min(sizes.pages);
             }
             plan.lines = plan.places * place_lines + (owned / line) as usize;
         }
@@ -166,8 +182,8 @@ impl Plan {
             tiles: share(TILES, 1608),
             partials: share(PARTIALS, 44),
         };
-        let lines = PLACES_MIN * lines_for(sizes.page_bytes_max);
-        Self { sizes, limits, places: PLACES_MIN, lines, copied_lines: 0, holds_all: false }
+        let lines = sizes.places_min() * lines_for(sizes.page_bytes_max);
+        Self { sizes, limits, places: sizes.places_min(), lines, copied_lines: 0, holds_all: false }
     }
 
     fn least_bytes(&self) -> u64 {
@@ -195,7 +211,7 @@ impl Plan {
             return 0;
         }
         let line = size_of::<Line>() as u64;
-        memory.saturating_sub(self.with_places(PLACES_MIN).sum().total_bytes()) / line * line
+        memory.saturating_sub(self.with_places(self.sizes.places_min()).sum().total_bytes()) / line * line
     }
 
     /// The same with `bytes`, in whole lines, for copies of others' pages: its cache gets the smaller.
@@ -208,7 +224,7 @@ impl Plan {
         }
         let room = self.room_for_copies(memory);
         let Some(rest) = room.checked_sub(bytes) else { return Err(PlanError::LightCache { bytes, room }) };
-        let places = PLACES_MIN + (rest / self.place_bytes()) as usize;
+        let places = self.sizes.places_min() + (rest / self.place_bytes()) as usize;
         let mut plan = self.with_places(places.min(self.places));
         plan.copied_lines = bytes as usize / size_of::<Line>();
         plan.lines += plan.copied_lines;
@@ -224,7 +240,7 @@ impl Plan {
             let owned = owned_max.unwrap_or(self.sizes.even_share(nodes));
             let place_lines = lines_for(self.sizes.page_bytes_max);
             let places = bytes.saturating_sub(owned) / (place_lines as u64 * line);
-            self.places = (places as usize).clamp(PLACES_MIN, self.sizes.pages + PLACES_MIN);
+            self.places = (places as usize).clamp(self.sizes.places_min(), self.sizes.pages + self.sizes.places_min());
             self.lines = self.places * place_lines + (owned / line) as usize;
             self.holds_all = false;
         }
@@ -249,7 +265,7 @@ impl Plan {
     /// Bytes of pages, rounded up to lines, that a node could own if it had no more of a cache than it must.
     #[must_use]
     pub fn owned_bytes_max(&self) -> u64 {
-        let least = PLACES_MIN * lines_for(self.sizes.page_bytes_max);
+        let least = self.sizes.places_min() * lines_for(self.sizes.page_bytes_max);
         (self.lines.saturating_sub(least) * size_of::<Line>()) as u64
     }
 
@@ -264,6 +280,9 @@ impl Plan {
         sum.add::<u32>("where pages are", s.pages);
         sum.add::<Material>("materials", s.materials);
         sum.add::<Light>("lights", s.lights);
+        sum.add::<Maps>("what materials take from textures", s.maps[0]);
+        sum.add::<Map>("uses of textures", s.maps[1]);
+        sum.add::<Texture>("textures", s.maps[2]);
         sum.add::<CachePlace>("places of the cache", self.places);
         sum.add::<Line>("pages", self.lines - self.copied_lines);
         sum.add::<Line>("copies of pages", self.copied_lines);
@@ -288,16 +307,23 @@ impl Plan {
         let at = arena.take("where pages are", entries.len(), 0u32)?;
         let materials = &*arena.take_with("materials", shading.materials.len(), |i| shading.materials[i])?;
         let lights = &*arena.take_with("lights", shading.lights.len(), |i| shading.lights[i])?;
+        let from = &shading.maps;
+        let maps = MapTables {
+            maps: &*arena.take_with("what materials take from textures", from.maps.len(), |i| from.maps[i])?,
+            uses: &*arena.take_with("uses of textures", from.uses.len(), |i| from.uses[i])?,
+            textures: &*arena.take_with("textures", from.textures.len(), |i| from.textures[i])?,
+        };
         let places = arena.take_with("places of the cache", self.places, |_| CachePlace::free())?;
         let lines = arena.take("pages", self.lines, Line([0; 64]))?;
         let own = Own { lines, tables: Tables { materials: materials.len() } };
-        let cache = Cache::new(own, entries, up, at, places, self.sizes.page_bytes_max);
+        let cache = Cache::new(own, entries, up, at, places, self.sizes.page_bytes_max, self.sizes.lane_places());
         let scene = Scene {
             resident: Resident { directory: Directory { nodes, entries }, pages: &[][..] },
-            shading: hybray_shading::Scene { materials, lights, ..*shading },
+            shading: hybray_shading::Scene { materials, lights, maps, ..*shading },
             background: scene.background,
             magnitude: scene.magnitude,
             transmits: scene.transmits,
+            texels: &[],
         };
         Ok((memory, cache, scene))
     }
@@ -328,7 +354,8 @@ impl Plan {
         let places = arena.take_with("places of the cache", self.places, |_| CachePlace::free())?;
         let pages: &'m [PageView<'m>] = scene.resident.pages;
         let entries = scene.resident.directory.entries;
-        Ok((memory, Cache::new(Charged(pages, bytes), entries, up, at, places, self.sizes.page_bytes_max)))
+        let (bytes_max, lanes) = (self.sizes.page_bytes_max, self.sizes.lane_places());
+        Ok((memory, Cache::new(Charged(pages, bytes), entries, up, at, places, bytes_max, lanes)))
     }
 
     /// Settings that go with this plan.

@@ -83,6 +83,13 @@ pub const fn lane_waits(at_hand: bool) -> bool {
     !at_hand
 }
 
+/// Whether a ray that was taken up so many times in vain since its hit is known, for want of texels, is finished on the spot: a hit
+/// needs up to `texel_pages` of them at once, and a small cache may never have all. Twice as often is enough where it may.
+#[must_use]
+pub const fn goes_to_the_lane(tries: u8, texel_pages: usize) -> bool {
+    tries as usize > 2 * texel_pages + 2
+}
+
 /// Whether a new bundle may be begun: old work is finished first.
 #[must_use]
 pub const fn may_begin(waiting: usize, capacity: usize, in_system: usize) -> bool {

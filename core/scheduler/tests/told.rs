@@ -56,7 +56,7 @@ fn check_with(tiles: u32, runs: &[Message], from: Peer, message: Message, expect
     let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
     let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
     let (scene, settings) = (toy.scene(&pages), Settings::default());
-    let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
+    let mut node = Node::new(scene, All(&pages, &[]), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
     // The way to the dispatcher is full for a while.
     let mut link = Sent { refused: 2, ..Sent::default() };
     node.handle(HOST, &View { message: Message::Begin(Toy::frame(8 * tiles, 8, 1)), body: &[] });
@@ -122,7 +122,8 @@ fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
     let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
     let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
     let settings = Settings { subhosts: Some(subhosts), ..Settings::default() };
-    let mut node = Node::new(toy.scene(&pages), All(&pages), SCENE_HASH, Kernels::Portable, 2, HOST, settings, memory);
+    let mut node =
+        Node::new(toy.scene(&pages), All(&pages, &[]), SCENE_HASH, Kernels::Portable, 2, HOST, settings, memory);
     // The way to the dispatcher is full for a while.
     let mut link = Sent { refused: 2, ..Sent::default() };
     node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });

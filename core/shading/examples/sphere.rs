@@ -5,7 +5,9 @@
 use std::io::Write;
 
 use glam::Vec3;
-use hybray_shading::{Camera, Child, Filter, Light, LightKind, Material, Scene, Surface, id, sample_offset, spawn};
+use hybray_shading::{
+    Camera, Child, Filter, Light, LightKind, Look, MapTables, Material, Scene, Surface, id, sample_offset, spawn,
+};
 
 const SIZE: u32 = 256;
 const SPP: u32 = 16;
@@ -40,7 +42,7 @@ fn hit(origin: Vec3, direction: Vec3, t_max: f32, medium: u16) -> Option<(f32, S
 /// What is left of a shadow ray's contribution at the light.
 fn lit(scene: &Scene, mut origin: Vec3, direction: Vec3, mut t_max: f32, mut left: [f32; 3]) -> Option<[f32; 3]> {
     while let Some((t, surface)) = hit(origin, direction, t_max, 0) {
-        (origin, left) = spawn::pass_through(scene, &surface, left)?;
+        (origin, left) = spawn::pass_through(scene, &surface, 1.0, left)?;
         t_max -= t;
     }
     Some(left)
@@ -73,6 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         weight_cutoff: 1.0 / 512.0,
         distance_scale: 1.0,
         shadow_rays: spawn::shadow_rays(&lights),
+        maps: MapTables::default(),
     };
     let camera = Camera::look(Vec3::new(0.0, -5.0, 1.5), Vec3::ZERO, Vec3::Z, 35.0, 0.0, SIZE, SIZE)?;
     let mut picture = Vec::new();
@@ -87,8 +90,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     sum += Vec3::from(weight) * Vec3::new(0.5, 0.7, 1.0);
                     continue;
                 };
-                sum += Vec3::from(spawn::local(&scene, &surface, weight));
-                let facing = spawn::Facing::new(&surface);
+                let facing = spawn::Facing::new(&surface, Look::PLAIN);
+                sum += Vec3::from(spawn::local(&scene, &facing, [1.0; 3], weight));
                 for cursor in 0..spawn::children(&scene, &surface) {
                     match spawn::child(&scene, &facing, weight, depth, id, cursor) {
                         Child::Shadow { origin, direction, t_max, contribution, .. } => {

@@ -146,6 +146,13 @@ impl Camera {
         }
     }
 
+    /// Half the width of what a primary ray along `direction` (unit) stands for: where it starts, and what is added with each unit
+    /// of its way, as [`CameraRay::spread`].
+    #[must_use]
+    pub fn footprint(&self, direction: Vec3) -> [f32; 2] {
+        [0.0, 0.5 * self.pixel_slope * direction.dot(Vec3::from(self.forward))]
+    }
+
     /// How far the ray through a pixel goes right and up for each unit forward. Grows with `x` and with `offset[0]`,
     /// falls with `y` and with `offset[1]`, in rounded arithmetic too.
     #[must_use]

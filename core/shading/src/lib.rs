@@ -1,5 +1,5 @@
-//! Whitted's model, bit for bit the same on every processor: materials, lights, cameras, pixel filters, ray ids and
-//! the rays that a hit spawns, one at a time.
+//! Whitted's model and metallic-roughness, bit for bit the same on every processor: materials, textures, lights, cameras, pixel
+//! filters, ray ids and the rays that a hit spawns, one at a time.
 //!
 //! Nothing here traces, allocates or keeps state: each function is a function of its arguments. All arithmetic is
 //! `+ - * /`, the correctly rounded square root and `libm`.
@@ -10,7 +10,9 @@
 extern crate std;
 
 mod camera;
+mod detail;
 mod filter;
+mod glossy;
 mod highlight;
 pub mod id;
 mod illuminate;
@@ -20,11 +22,14 @@ pub mod optics;
 pub mod spawn;
 mod stratify;
 mod surface;
+mod texture;
 mod vector;
 
 pub use camera::{Camera, CameraError, CameraRay};
+pub use detail::{Detail, Look, Map, MapTables, Maps, Seen, coverage, seen};
 pub use filter::{Filter, sample_offset};
 pub use light::{Light, LightKind};
 pub use material::{Highlight, Material};
 pub use spawn::{Child, Scene};
 pub use surface::{Surface, offset_origin, pack_normal, terminator_shift, unpack_normal};
+pub use texture::{Format, SRGB, Sampling, Texture, Wrap, from_shared_exponent, to_shared_exponent};

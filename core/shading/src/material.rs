@@ -1,4 +1,4 @@
-//! Materials: Whitted's model as OBJ/MTL and NFF can say it.
+//! Materials: Whitted's model as OBJ/MTL and NFF can say it, and metallic-roughness as glTF does.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -16,6 +16,11 @@ pub enum Highlight {
 }
 
 /// A material as a node's table holds it. Colours are linear, 0 and up.
+///
+/// With [`Material::PHYSICAL`] it is one of metallic-roughness: `diffuse` is the base colour, `exponent` the roughness, `mirror` the
+/// metalness (of which the first number counts), `transmission` the share of what is no metal that goes through, times the base
+/// colour, and `ambient` the absorption inside: light that goes as far as a file unit keeps `exp(-ambient)` of itself. Its
+/// diffuse part reflects ambient light, and `specular` and `highlight` are not used.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Material {
@@ -47,6 +52,18 @@ impl Material {
     /// Mirror and refracted ray share the light by Fresnel's equations (dielectric): the mirrored ray gains what
     /// the refracted one loses.
     pub const FRESNEL: u32 = 1;
+    /// Metallic-roughness, see above.
+    pub const PHYSICAL: u32 = 2;
+    /// It has [`Maps`](crate::Maps), or its triangles have colours.
+    pub const DETAIL: u32 = 4;
+    /// It is there where its coverage is at least its cutoff, and nowhere else.
+    pub const CUTOUT: u32 = 8;
+    /// As much of it is there as its coverage says; the rest of the light goes straight on. Not together with transmission.
+    pub const BLEND: u32 = 16;
+    /// Rays that look for their nearest hit pass it from behind.
+    pub const SINGLE_SIDED: u32 = 32;
+    /// Its normal map has the slopes of heights.
+    pub const BUMP: u32 = 64;
 
     /// Matt grey of reflectance 0.75 (without highlight, mirror or transmission).
     pub const MATT: Self = Self {
@@ -72,16 +89,30 @@ impl Material {
         }
     }
 
-    /// Whether light passes through.
+    /// Whether light passes through, here or there.
     #[must_use]
     pub fn transmits(&self) -> bool {
+        self.refracts() || self.flags & (Self::CUTOUT | Self::BLEND) != 0
+    }
+
+    /// Whether it spawns refracted rays.
+    #[must_use]
+    pub fn refracts(&self) -> bool {
         self.transmission.iter().any(|&c| c > 0.0)
+    }
+
+    /// Whether a ray that looks for its nearest hit may pass it.
+    #[must_use]
+    pub const fn may_be_passed(&self) -> bool {
+        self.flags & (Self::CUTOUT | Self::SINGLE_SIDED) != 0
     }
 
     /// Whether it spawns mirrored rays.
     #[must_use]
     pub fn mirrors(&self) -> bool {
-        self.mirror.iter().any(|&c| c > 0.0) || (self.flags & Self::FRESNEL != 0 && self.transmits())
+        self.mirror.iter().any(|&c| c > 0.0)
+            || self.flags & Self::PHYSICAL != 0
+            || (self.flags & Self::FRESNEL != 0 && self.refracts())
     }
 }
 

@@ -15,11 +15,17 @@
 //! the material's; with it, Fresnel's share of the transmission moves to the mirrored ray; at total reflection all of
 //! it does.
 //! Source: Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6), 1980.
+//!
+//! A material of metallic-roughness shows what [`glossy`](crate::glossy) says of each light, and one mirrored and one refracted ray,
+//! both by the same facet, which is drawn by the ray's id. Where only a share of a surface is there, it shows that share of all
+//! this, and the rest of the ray goes straight on.
 
 use core::ops::Range;
 
 use glam::Vec3;
 
+use crate::detail::{Look, MapTables};
+use crate::glossy::Glossy;
 use crate::highlight;
 use crate::id;
 use crate::illuminate::arrival;
@@ -47,6 +53,8 @@ pub struct Scene<'a> {
     pub distance_scale: f32,
     /// What [`shadow_rays`] says of `lights`: the scene is asked for it at every hit.
     pub shadow_rays: u32,
+    /// Textures, and what materials take from them.
+    pub maps: MapTables<'a>,
 }
 
 /// A ray that a hit spawns.
@@ -107,9 +115,33 @@ pub fn shadow_rays(lights: &[Light]) -> u32 {
 
 /// What the surface shows without any light: emission and ambient light, times `weight`.
 #[must_use]
-pub fn local(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3]) -> [f32; 3] {
-    let material = material(scene, surface.material);
-    channels(|c| weight[c] * (material.emission[c] + material.ambient[c] * scene.ambient[c]))
+pub fn local(scene: &Scene<'_>, facing: &Facing, emission: [f32; 3], weight: [f32; 3]) -> [f32; 3] {
+    let room = &mut None;
+    let (material, coverage) = shown(scene, facing, room);
+    let physical = material.flags & Material::PHYSICAL != 0;
+    let ambient = if physical { Glossy::new(material).diffuse } else { material.ambient };
+    channels(|c| weight[c] * (material.emission[c] * emission[c] + ambient[c] * scene.ambient[c]) * coverage)
+}
+
+/// The material at a hit, and how much of it is there.
+#[inline(always)]
+fn shown<'a>(scene: &Scene<'a>, facing: &Facing, room: &'a mut Option<Material>) -> (&'a Material, f32) {
+    let material = material(scene, facing.material);
+    if material.flags & Material::DETAIL == 0 {
+        return (material, 1.0);
+    }
+    let blends = material.flags & Material::BLEND != 0;
+    (room.insert(facing.look.of(material)), if blends { facing.look.coverage() } else { 1.0 })
+}
+
+/// What is left of a ray's weight after `distance` (internal units) through its medium.
+#[must_use]
+pub fn absorbed(scene: &Scene<'_>, medium: u16, distance: f32, weight: [f32; 3]) -> [f32; 3] {
+    let Some(material) = medium.checked_sub(1).and_then(|m| scene.materials.get(usize::from(m))) else { return weight };
+    if material.flags & Material::PHYSICAL == 0 || material.ambient == [0.0; 3] {
+        return weight;
+    }
+    channels(|c| weight[c] * libm::expf(-material.ambient[c] * (distance * scene.distance_scale)))
 }
 
 /// Cursor positions of a hit on this surface: those of the shadow rays, light by light, then one for the mirrored ray
@@ -117,7 +149,7 @@ pub fn local(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3]) -> [f32; 3]
 #[must_use]
 pub fn children(scene: &Scene<'_>, surface: &Surface) -> u32 {
     let material = material(scene, surface.material);
-    let last = if material.transmits() {
+    let last = if material.refracts() || material.flags & Material::BLEND != 0 {
         2
     } else if material.mirrors() {
         1
@@ -132,17 +164,24 @@ pub fn children(scene: &Scene<'_>, surface: &Surface) -> u32 {
 /// Bounded work: constant if every light casts one shadow ray, else at most one look at each light.
 #[must_use]
 pub fn child(scene: &Scene<'_>, facing: &Facing, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
-    let material = material(scene, facing.material);
+    let room = &mut None;
+    let (material, coverage) = shown(scene, facing, room);
     if let Some(past_lights) = cursor.checked_sub(scene.shadow_rays) {
         let deeper = depth < scene.ray_depth_max;
+        let straight = past_lights == 1 && material.flags & Material::BLEND != 0 && !material.refracts();
+        if straight && deeper {
+            return straight_on(scene, facing, channels(|c| weight[c] * (1.0 - coverage)), cursor);
+        }
+        let weight = channels(|c| weight[c] * coverage);
         return match past_lights {
-            0 if deeper && (material.mirrors() || material.transmits()) => {
-                mirrored(scene, material, facing, weight, cursor)
+            0 if deeper && (material.mirrors() || material.refracts()) => {
+                mirrored(scene, material, facing, weight, id, cursor)
             }
-            1 if deeper && material.transmits() => refracted(scene, material, facing, weight, cursor),
+            1 if deeper && material.refracts() => refracted(scene, material, facing, weight, id, cursor),
             _ => Child::None,
         };
     }
+    let weight = channels(|c| weight[c] * coverage);
     let dark = [0.0; 3];
     if material.diffuse == dark && material.specular == dark {
         return Child::None;
@@ -159,26 +198,62 @@ pub fn of_one_light(scene: &Scene<'_>, cursor: u32) -> Range<u32> {
     find_light(scene, cursor).map_or(0..0, |(light, first)| first..first.saturating_add(light.shadow_rays()))
 }
 
-/// What a material lets through of a shadow ray's `contribution`; `None` if nothing.
+/// What a material lets through of a shadow ray's `contribution` where so much of it is there; `None` if nothing.
 #[must_use]
-pub fn let_through(scene: &Scene<'_>, material: u16, contribution: [f32; 3]) -> Option<[f32; 3]> {
-    let material = self::material(scene, material);
-    let left = channels(|c| contribution[c] * material.transmission[c]);
+pub fn let_through(scene: &Scene<'_>, index: u16, coverage: f32, contribution: [f32; 3]) -> Option<[f32; 3]> {
+    let material = material(scene, index);
+    let left = if material.flags & Material::CUTOUT != 0 && coverage < scene.maps.of(index).cutoff {
+        contribution
+    } else if material.flags & Material::BLEND != 0 {
+        channels(|c| contribution[c] * (1.0 - coverage))
+    } else if material.flags & Material::PHYSICAL != 0 {
+        let through = Glossy::new(material).through;
+        channels(|c| contribution[c] * through[c])
+    } else {
+        channels(|c| contribution[c] * material.transmission[c])
+    };
     (left != [0.0; 3]).then_some(left)
 }
 
 /// What goes on of a shadow ray that meets this surface: where it starts again, and what is left of its contribution.
 /// `None` if the surface is opaque. The direction stays; the new `t_max` is the old one minus the hit's `t`.
 #[must_use]
-pub fn pass_through(scene: &Scene<'_>, surface: &Surface, contribution: [f32; 3]) -> Option<(Vec3, [f32; 3])> {
-    let left = let_through(scene, surface.material, contribution)?;
+pub fn pass_through(
+    scene: &Scene<'_>,
+    surface: &Surface,
+    coverage: f32,
+    contribution: [f32; 3],
+) -> Option<(Vec3, [f32; 3])> {
+    let left = let_through(scene, surface.material, coverage, contribution)?;
+    Some((past(surface), left))
+}
+
+/// Where a ray goes on that passes `surface`.
+#[must_use]
+pub fn past(surface: &Surface) -> Vec3 {
     let ahead = if surface.geometric_normal.dot(surface.incoming) < 0.0 {
         -surface.geometric_normal
     } else {
         surface.geometric_normal
     };
-    let origin = offset_origin(surface.position, surface.error, ahead, ahead);
-    Some((origin, left))
+    offset_origin(surface.position, surface.error, ahead, ahead)
+}
+
+/// Whether a ray that looks for its nearest hit passes `surface`, of which so much is there.
+#[must_use]
+pub fn passes(scene: &Scene<'_>, surface: &Surface, coverage: f32) -> bool {
+    let material = material(scene, surface.material);
+    let behind = surface.geometric_normal.dot(surface.incoming) > 0.0;
+    (material.flags & Material::SINGLE_SIDED != 0 && behind && !material.refracts())
+        || (material.flags & Material::CUTOUT != 0 && coverage < scene.maps.of(surface.material).cutoff)
+}
+
+/// How much of a flat mirror's the rays' openings are that a hit mirrors and refracts: radians to be added to a footprint's.
+#[must_use]
+pub fn opening(scene: &Scene<'_>, facing: &Facing) -> f32 {
+    let room = &mut None;
+    let (material, _) = shown(scene, facing, room);
+    if material.flags & Material::PHYSICAL == 0 { 0.0 } else { Glossy::new(material).opening() }
 }
 
 /// Cosine between a spawned ray and the surface that it must at least have, some 0.001 degrees: more than the roundings
@@ -199,6 +274,7 @@ pub struct Facing {
     lifted: bool,
     material: u16,
     medium: u16,
+    look: Look,
 }
 
 impl Facing {
@@ -213,11 +289,12 @@ impl Facing {
         lifted: false,
         material: 0,
         medium: 0,
+        look: Look::PLAIN,
     };
 
-    /// The hit on `surface`.
+    /// The hit on `surface`, whose textures say `look`.
     #[must_use]
-    pub fn new(surface: &Surface) -> Self {
+    pub fn new(surface: &Surface, look: Look) -> Self {
         let Surface { position, error, geometric_normal, shading_normal, shadow_offset, incoming, material, medium } =
             *surface;
         let geometric = if geometric_normal.dot(incoming) > 0.0 { -geometric_normal } else { geometric_normal };
@@ -230,7 +307,7 @@ impl Facing {
         let start_error = error + (start.abs() + shadow_offset.abs()) * f32::EPSILON;
         let start_error = if lifted { start_error } else { error };
         let shadow_origin = offset_origin(start, start_error, geometric, geometric);
-        Self { position, error, incoming, geometric, shading, shadow_origin, lifted, material, medium }
+        Self { position, error, incoming, geometric, shading, shadow_origin, lifted, material, medium, look }
     }
 
     /// The shading normal, bent just enough to face the viewer, and its cosine with the view.
@@ -297,11 +374,14 @@ fn shadow(
     if !(cosine > 0.0) || (behind && !facing.lifted) {
         return Child::None;
     }
-    let highlight = highlight::strength(material, facing.incoming, facing.shading, found.direction);
     let strength = found.strength / rays as f32;
-    let contribution = channels(|c| {
-        weight[c] * (light.colour[c] * strength) * (material.diffuse[c] * cosine + material.specular[c] * highlight)
-    });
+    let shown = if material.flags & Material::PHYSICAL == 0 {
+        let highlight = highlight::strength(material, facing.incoming, facing.shading, found.direction);
+        channels(|c| material.diffuse[c] * cosine + material.specular[c] * highlight)
+    } else {
+        Glossy::new(material).shown(facing.incoming, facing.towards_viewer().0, found.direction, cosine, true)
+    };
+    let contribution = channels(|c| weight[c] * (light.colour[c] * strength) * shown[c]);
     // What is not finite goes on: the film counts it.
     if contribution == [0.0; 3] {
         return Child::None;
@@ -321,6 +401,12 @@ struct Crossing {
 
 impl Crossing {
     fn new(scene: &Scene<'_>, material: &Material, facing: &Facing) -> Self {
+        let (normal, cos_in) = facing.towards_viewer();
+        Self::at(scene, material, facing, normal, cos_in)
+    }
+
+    /// That of a facet.
+    fn at(scene: &Scene<'_>, material: &Material, facing: &Facing, normal: Vec3, cos_in: f32) -> Self {
         let inside = facing.material.saturating_add(1);
         let here = match facing.medium.checked_sub(1) {
             None => 1.0,
@@ -328,7 +414,6 @@ impl Crossing {
         };
         let (there, medium) = if facing.medium == inside { (1.0, 0) } else { (index_of_refraction(material), inside) };
         let eta = here / there;
-        let (normal, cos_in) = facing.towards_viewer();
         Self { normal, cos_in, eta, boundary: optics::boundary(eta, cos_in), medium }
     }
 
@@ -347,8 +432,11 @@ fn carries(scene: &Scene<'_>, weight: [f32; 3]) -> bool {
     weight.iter().any(|&w| w > 0.0 && w >= scene.weight_cutoff)
 }
 
-fn mirrored(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], cursor: u32) -> Child {
-    let share = if material.transmits() { Crossing::new(scene, material, facing).mirrored(material) } else { 0.0 };
+fn mirrored(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], id: u64, cursor: u32) -> Child {
+    if material.flags & Material::PHYSICAL != 0 {
+        return glossy_mirrored(scene, material, facing, weight, id, cursor);
+    }
+    let share = if material.refracts() { Crossing::new(scene, material, facing).mirrored(material) } else { 0.0 };
     let weight = channels(|c| weight[c] * (material.mirror[c] + material.transmission[c] * share));
     if !carries(scene, weight) {
         return Child::None;
@@ -364,7 +452,107 @@ fn mirrored(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f3
     }
 }
 
-fn refracted(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], cursor: u32) -> Child {
+/// The choice among facets: a dimension that no light has.
+const FACET: u32 = u32::MAX - 1;
+
+/// A facet of the surface as the viewer sees it: the surface, the facet's normal and its cosine with the view, and the normal's.
+fn facet(material: &Material, facing: &Facing, id: u64) -> (Glossy, Vec3, f32, f32) {
+    let glossy = Glossy::new(material);
+    let (normal, view) = facing.towards_viewer();
+    let facet = glossy.facet(facing.incoming, normal, id::unit_pair(id, FACET));
+    let cosine = -facet.dot(facing.incoming);
+    let cosine = if cosine > GRAZING { if cosine < 1.0 { cosine } else { 1.0 } } else { GRAZING };
+    (glossy, facet, cosine, view)
+}
+
+fn glossy_mirrored(
+    scene: &Scene<'_>,
+    material: &Material,
+    facing: &Facing,
+    weight: [f32; 3],
+    id: u64,
+    cursor: u32,
+) -> Child {
+    let (glossy, facet, cosine, view) = facet(material, facing, id);
+    let (normal, _) = facing.towards_viewer();
+    let direction = normalize(optics::mirror(facing.incoming, facet));
+    let out = direction.dot(normal);
+    if !(out > 0.0) {
+        return Child::None;
+    }
+    let mut share = glossy.fresnel(cosine);
+    if glossy.through != [0.0; 3] {
+        // Of glass it is Fresnel's own, and more from inside.
+        let boundary = Crossing::at(scene, material, facing, facet, cosine).boundary;
+        let metal = material.mirror[0];
+        share = channels(|c| share[c] * metal + boundary.reflectance * (1.0 - metal));
+    }
+    let passes = glossy.passes(view, out);
+    let weight = channels(|c| weight[c] * share[c] * passes);
+    if !carries(scene, weight) {
+        return Child::None;
+    }
+    Child::Mirror {
+        origin: offset_origin(facing.position, facing.error, facing.geometric, facing.geometric),
+        direction: lift(direction, facing.geometric),
+        weight,
+        medium: facing.medium,
+        branch: cursor.saturating_add(1),
+    }
+}
+
+fn glossy_refracted(
+    scene: &Scene<'_>,
+    material: &Material,
+    facing: &Facing,
+    weight: [f32; 3],
+    id: u64,
+    cursor: u32,
+) -> Child {
+    let (glossy, facet, cosine, view) = facet(material, facing, id);
+    let Crossing { normal, cos_in, eta, boundary, medium } = Crossing::at(scene, material, facing, facet, cosine);
+    if boundary.total {
+        return Child::None;
+    }
+    let direction = normalize(optics::refract(facing.incoming, normal, eta, cos_in, boundary.cos_out));
+    let out = -direction.dot(facing.towards_viewer().0);
+    if !(out > 0.0) {
+        return Child::None;
+    }
+    let passes = glossy.passes(view, out) * (1.0 - boundary.reflectance);
+    let weight = channels(|c| weight[c] * glossy.through[c] * passes);
+    if !carries(scene, weight) {
+        return Child::None;
+    }
+    let beyond = -facing.geometric;
+    Child::Refract {
+        origin: offset_origin(facing.position, facing.error, beyond, beyond),
+        direction: lift(direction, beyond),
+        weight,
+        medium,
+        branch: cursor.saturating_add(1),
+    }
+}
+
+/// The rest of a ray where not all of a surface is there.
+fn straight_on(scene: &Scene<'_>, facing: &Facing, weight: [f32; 3], cursor: u32) -> Child {
+    if !carries(scene, weight) {
+        return Child::None;
+    }
+    let beyond = -facing.geometric;
+    Child::Refract {
+        origin: offset_origin(facing.position, facing.error, beyond, beyond),
+        direction: facing.incoming,
+        weight,
+        medium: facing.medium,
+        branch: cursor.saturating_add(1),
+    }
+}
+
+fn refracted(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f32; 3], id: u64, cursor: u32) -> Child {
+    if material.flags & Material::PHYSICAL != 0 {
+        return glossy_refracted(scene, material, facing, weight, id, cursor);
+    }
     let crossing = Crossing::new(scene, material, facing);
     let share = 1.0 - crossing.mirrored(material);
     let weight = channels(|c| weight[c] * (material.transmission[c] * share));

@@ -5,8 +5,8 @@ use hybray_bintree::walk::Hit;
 use hybray_geometry::{Ray, RayKernel, SurfacePoint, Vec3, gamma};
 use hybray_scene::{BLOCK, Kind, PageView, Slot};
 use hybray_shading::spawn::{self, Facing};
-use hybray_shading::{Child, Surface, id, unpack_normal};
-use hybray_wire::RayRecord;
+use hybray_shading::{Child, Detail, Surface, id, unpack_normal};
+use hybray_wire::{RayKind, RayRecord};
 
 /// Whom a ray and its children are traced for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,8 @@ pub struct HitRecord {
     pub done: u64,
     /// Children before this have been tried together with others.
     pub tried: u32,
+    /// What the ray stood for there, as [`RayRecord::packed_footprint`].
+    pub footprint: f32,
     /// For whom.
     pub origin: Origin,
     /// 1 for a primary ray's hit.
@@ -67,6 +69,7 @@ impl HitRecord {
         end: 0,
         done: 0,
         tried: 0,
+        footprint: 0.0,
         origin: Origin { tile: 0, epoch: 0, home: 0, pixel: 0 },
         depth: 0,
     };
@@ -132,6 +135,11 @@ pub fn surface_point(page: &PageView<'_>, ray: &Ray, hit: &Hit) -> SurfacePoint 
 /// be put to.
 #[must_use]
 pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surface> {
+    place(page, ray, hit).map(|(surface, _)| surface)
+}
+
+/// The surface, and the hit's place on a triangle: shares of its second and third corner.
+pub(crate) fn place(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<(Surface, [f32; 2])> {
     let held = match hit.slot.kind() {
         Kind::Triangle => page.body.triangle_lanes(),
         Kind::Sphere => page.spheres.len() * BLOCK,
@@ -151,14 +159,58 @@ pub fn surface(page: &PageView<'_>, ray: &RayRecord, hit: &Hit) -> Option<Surfac
         material: page.material(hit.slot),
         medium: ray.medium,
     };
-    Some(match vertex_normals(page, hit.slot) {
+    let surface = match vertex_normals(page, hit.slot) {
         Some(packed) => {
             let corners = page.body.triangle(hit.slot.number()).v;
             let [u, v] = point.uv;
             flat.smooth(corners, packed.map(unpack_normal), [1.0 - u - v, u, v])
         }
         None => flat,
-    })
+    };
+    Some((surface, point.uv))
+}
+
+/// Half the width of what a ray stands for where it hits, and what is added with each unit of its way from there on.
+pub(crate) fn footprint_at(ray: &RayRecord, hit: &Hit) -> [f32; 2] {
+    if ray.kind == RayKind::Shadow as u8 {
+        return [f32::from_bits(u32::from(ray.medium) << 16), 0.0];
+    }
+    let [width, spread] = ray.footprint();
+    [width + hit.candidate.t * spread, spread]
+}
+
+/// What `hit` at `uv` of a triangle tells of textures. Seen from aside, more of the surface is within the footprint: the width that
+/// counts is that along the slope (Akenine-Moller et al., *Texture Level of Detail Strategies for Real-Time Ray Tracing*, Ray Tracing
+/// Gems, chapter 20, 2019).
+pub(crate) fn detail(page: &PageView<'_>, ray: &RayRecord, hit: &Hit, surface: &Surface, uv: [f32; 2]) -> Detail {
+    let mut detail = Detail { uv: [0.0; 2], footprint: 0.0, along: [Vec3::ZERO; 2], colour: [1.0; 4] };
+    if hit.slot.kind() != Kind::Triangle {
+        return detail;
+    }
+    let number = hit.slot.number();
+    let shares = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
+    if let Some(corners) = page.colours.get(number) {
+        detail.colour = Detail::colour(corners, shares);
+    }
+    if let Some(&[a, b, c]) = page.coordinates.get(number) {
+        let [p, q, r] = page.body.triangle(number).v;
+        let (first, second) = (q - p, r - p);
+        let ([b_u, b_v], [c_u, c_v]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        let double_area = b_u * c_v - b_v * c_u;
+        detail.uv = [0, 1].map(|i| a[i] * shares[0] + b[i] * shares[1] + c[i] * shares[2]);
+        if double_area != 0.0 {
+            detail.along = [first * c_v - second * b_v, second * b_u - first * c_u].map(|v| v / double_area);
+        }
+        let across = first.cross(second);
+        let [width, _] = footprint_at(ray, hit);
+        let direction = surface.incoming;
+        let slope = direction.dot(surface.geometric_normal).abs() / libm::sqrtf(direction.dot(direction));
+        // Texture coordinates of a unit of length, the mean of both ways.
+        let scale = libm::sqrtf(double_area.abs() / libm::sqrtf(across.dot(across)));
+        let footprint = 2.0 * width * scale / slope;
+        detail.footprint = if footprint.is_finite() { footprint } else { f32::MAX };
+    }
+    detail
 }
 
 fn vertex_normals(page: &PageView<'_>, slot: Slot) -> Option<[u32; 3]> {

@@ -1,15 +1,15 @@
 //! A lane: rays finished on the spot, depth first, in bounded memory, as far as the pages at hand go.
 
-use crate::hit::{HitRecord, Origin, surface};
+use crate::hit::{HitRecord, Origin, detail, footprint_at, place};
 use crate::scene::Scene;
 use crate::together::{self, Together};
 use bytemuck::Zeroable;
 use hybray_bintree::walk::{self, FROM_ROOT, Hit, Stack, Walk, Walked};
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
-use hybray_scene::{Pages, Slot};
-use hybray_shading::Child;
+use hybray_scene::{PageView, Pages, Slot};
 use hybray_shading::spawn::{self, Facing};
+use hybray_shading::{Child, Look, Material, Seen, Surface};
 use hybray_wire::{Counts, RayKind, RayRecord};
 
 /// Where results go.
@@ -104,8 +104,11 @@ impl<'s> Walker<'s> {
                 return None;
             }
         }
-        let at_hand = !best.candidate.is_hit() || scene.resident.pages.page(best.page).is_some();
-        at_hand.then_some(best)
+        if best.candidate.is_hit() && scene.resident.pages.page(best.page).is_none() {
+            ray.page = best.page;
+            return None;
+        }
+        Some(best)
     }
 
     /// Takes a shadow ray on from where it is: what of its weight arrives at the light, once that is known. Before that
@@ -131,10 +134,23 @@ impl<'s> Walker<'s> {
             if !hit.candidate.is_hit() {
                 return Some(ray.weight);
             }
-            let Some(place) = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, &hit)) else {
+            let Some((page, (place, uv))) =
+                scene.resident.pages.page(hit.page).and_then(|page| Some((page, place(&page, ray, &hit)?)))
+            else {
                 return Some([0.0; 3]);
             };
-            let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, ray.weight)
+            let coverage = match flags(scene, place.material) & (Material::CUTOUT | Material::BLEND) {
+                0 => Ok(1.0),
+                _ => covers(scene, &page, ray, &hit, (&place, uv), &mut self.counts),
+            };
+            let coverage = match coverage {
+                Ok(coverage) => coverage,
+                Err(page) => {
+                    *ray = wants(ray, &hit, page);
+                    return None;
+                }
+            };
+            let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, coverage, ray.weight)
                 .filter(|_| u32::from(ray.passed) < SHADOW_CHAIN_MAX)
             else {
                 return Some([0.0; 3]);
@@ -148,12 +164,44 @@ impl<'s> Walker<'s> {
             ray.weight = rest;
             ray.passed += 1;
             (ray.t_max, ray.primitive, ray.page, ray.settled) = (ray.t_end, Candidate::NOTHING, FROM_ROOT, 0);
+            ray.tries = 0;
         }
     }
 }
 
-/// Transparent surfaces that a shadow ray may pass.
+/// Surfaces that a ray may pass: transparent ones or holes for a shadow ray, holes for others.
 pub const SHADOW_CHAIN_MAX: u32 = 256;
+
+fn flags<P: Pages + ?Sized>(scene: &Scene<'_, P>, material: u16) -> u32 {
+    scene.shading.materials.get(usize::from(material)).map_or(0, |material| material.flags)
+}
+
+/// How much of a surface is there where a ray hits it, or the page of texels that says it and is not at hand.
+fn covers<P: Pages + ?Sized>(
+    scene: &Scene<'_, P>,
+    page: &PageView<'_>,
+    ray: &RayRecord,
+    hit: &Hit,
+    (surface, uv): (&Surface, [f32; 2]),
+    counts: &mut walk::Counts,
+) -> Result<f32, u32> {
+    let detail = detail(page, ray, hit, surface, uv);
+    hybray_shading::coverage(&scene.shading, scene.resident.pages, surface.material, &detail, &mut counts.look_ups)
+}
+
+/// The ray whose hit is known and wants a page of texels.
+fn wants(ray: &RayRecord, hit: &Hit, page: u32) -> RayRecord {
+    RayRecord {
+        t_max: hit.candidate.t,
+        primitive: hit.candidate.id,
+        hit_page: hit.page,
+        slot: hit.slot.0,
+        settled: 1,
+        tries: ray.tries.saturating_add(1),
+        page,
+        ..*ray
+    }
+}
 
 /// Records for one ray and all that it causes: one for each level of depth.
 pub struct Lane<'r> {
@@ -214,11 +262,18 @@ impl<'r> Lane<'r> {
             sink.ended(&origin, ray.id.wrapping_neg());
             return None;
         }
-        let Some(hit) = walker.nearest(scene, &mut ray) else { return Some(ray) };
-        if let Some(record) = begin(scene, &ray, &hit, sink, counts) {
-            self.push(record);
+        loop {
+            let Some(hit) = walker.nearest(scene, &mut ray) else { return Some(ray) };
+            match begin(scene, &ray, &hit, sink, counts, &mut walker.counts) {
+                Ok(None) => return None,
+                Ok(Some(record)) => {
+                    self.push(record);
+                    return None;
+                }
+                Err(on) if on.settled == 1 => return Some(on),
+                Err(on) => ray = on,
+            }
         }
-        None
     }
 
     /// Traces the next child of the deepest record, or its next shadow rays to one light, or ends it. A child that needs a
@@ -244,7 +299,7 @@ impl<'r> Lane<'r> {
         let cursor = record.cursor;
         record.advance();
         let spawned = Spawned::of(&record.child(&scene.shading, cursor))?;
-        let ray = spawned.record(record);
+        let ray = spawned.record(record, scene);
         record.adopt(ray.id);
         match spawned.kind {
             RayKind::Shadow => counts.shadow += 1,
@@ -293,14 +348,23 @@ impl Spawned {
     }
 
     /// As it travels from a hit.
-    pub(crate) fn record(&self, hit: &HitRecord) -> RayRecord {
+    pub(crate) fn record<P: Pages + ?Sized>(&self, hit: &HitRecord, scene: &Scene<'_, P>) -> RayRecord {
         let Self { kind, ray, weight, medium, branch } = *self;
         let origin = hit.origin;
+        let (t_end, medium) = if !scene.has_textures() {
+            (ray.t_max, medium)
+        } else if kind == RayKind::Shadow {
+            (ray.t_max, (hit.footprint.to_bits() >> 16) as u16)
+        } else {
+            let [width, spread] = RayRecord { t_end: hit.footprint, ..RayRecord::zeroed() }.footprint();
+            let spread = spread + spawn::opening(&scene.shading, &hit.facing);
+            (RayRecord::packed_footprint([width, spread]), medium)
+        };
         RayRecord {
             origin: ray.origin.to_array(),
             direction: ray.direction.to_array(),
             t_max: ray.t_max,
-            t_end: ray.t_max,
+            t_end,
             id: hit.child_id(branch),
             primitive: Candidate::NOTHING,
             weight,
@@ -319,26 +383,83 @@ impl Spawned {
 
 /// Takes in a ray whose nearest hit is known, and whose hit's page is at hand: it becomes a record, or it ends here.
 /// A hit that its page does not have (from a peer that lies) is no hit, and no entry: its tile will not balance.
+///
+/// # Errors
+/// The ray as it goes on: from the root behind what it passes, or with the page of texels that it wants, and its hit. Nothing has
+/// been told to `sink` then.
 pub fn begin<S: Sink, P: Pages + ?Sized>(
     scene: &Scene<'_, P>,
     ray: &RayRecord,
     hit: &Hit,
     sink: &mut S,
     counts: &mut Counts,
-) -> Option<HitRecord> {
+    walks: &mut walk::Counts,
+) -> Result<Option<HitRecord>, RayRecord> {
     let origin = Origin::of(ray);
     if !hit.candidate.is_hit() {
         let seen: [f32; 3] = core::array::from_fn(|c| ray.weight[c] * scene.background[c]);
         add(sink, &origin, seen);
         sink.ended(&origin, ray.id.wrapping_neg());
-        return None;
+        return Ok(None);
     }
-    let surface = scene.resident.pages.page(hit.page).and_then(|page| surface(&page, ray, hit))?;
+    let Some(page) = scene.resident.pages.page(hit.page) else { return Ok(None) };
+    let Some((surface, uv)) = place(&page, ray, hit) else { return Ok(None) };
+    let flags = flags(scene, surface.material);
+    let looked = if flags & (Material::DETAIL | Material::CUTOUT | Material::SINGLE_SIDED) == 0 {
+        None
+    } else {
+        look(scene, &page, ray, hit, (&surface, uv), flags, walks)?
+    };
+    let (surface, look, emission) = match looked {
+        None => (surface, Look::PLAIN, [1.0; 3]),
+        Some(Seen { look, emission, shading_normal }) => (Surface { shading_normal, ..surface }, look, emission),
+    };
     counts.hits += 1;
-    add(sink, &origin, spawn::local(&scene.shading, &surface, ray.weight));
+    let facing = Facing::new(&surface, look);
+    let weight = match ray.medium {
+        0 => ray.weight,
+        medium => spawn::absorbed(&scene.shading, medium, hit.candidate.t, ray.weight),
+    };
+    add(sink, &origin, spawn::local(&scene.shading, &facing, emission, weight));
     let end = spawn::children(&scene.shading, &surface);
-    let facing = Facing::new(&surface);
-    Some(HitRecord { facing, weight: ray.weight, id: ray.id, end, origin, depth: ray.depth, ..HitRecord::EMPTY })
+    let footprint = if scene.has_textures() { RayRecord::packed_footprint(footprint_at(ray, hit)) } else { 0.0 };
+    Ok(Some(HitRecord { facing, weight, id: ray.id, end, footprint, origin, depth: ray.depth, ..HitRecord::EMPTY }))
+}
+
+/// What textures say at a hit, if the material has any and the ray does not pass it.
+#[inline(never)]
+fn look<P: Pages + ?Sized>(
+    scene: &Scene<'_, P>,
+    page: &PageView<'_>,
+    ray: &RayRecord,
+    hit: &Hit,
+    (surface, uv): (&Surface, [f32; 2]),
+    flags: u32,
+    walks: &mut walk::Counts,
+) -> Result<Option<Seen>, RayRecord> {
+    let cut = flags & Material::CUTOUT != 0;
+    let coverage = if cut { covers(scene, page, ray, hit, (surface, uv), walks) } else { Ok(1.0) };
+    let coverage = coverage.map_err(|page| wants(ray, hit, page))?;
+    if u32::from(ray.passed) < SHADOW_CHAIN_MAX && spawn::passes(&scene.shading, surface, coverage) {
+        return Err(RayRecord {
+            origin: spawn::past(surface).to_array(),
+            t_min: 0.0,
+            t_max: f32::INFINITY,
+            t_end: if scene.has_textures() { RayRecord::packed_footprint(footprint_at(ray, hit)) } else { ray.t_end },
+            primitive: Candidate::NOTHING,
+            page: FROM_ROOT,
+            passed: ray.passed + 1,
+            settled: 0,
+            tries: 0,
+            ..*ray
+        });
+    }
+    if flags & Material::DETAIL == 0 {
+        return Ok(None);
+    }
+    let detail = detail(page, ray, hit, surface, uv);
+    let seen = hybray_shading::seen(&scene.shading, scene.resident.pages, surface, &detail, &mut walks.look_ups);
+    seen.map(Some).map_err(|page| wants(ray, hit, page))
 }
 
 /// Zero adds nothing, and is not sent.

@@ -1,7 +1,7 @@
 //! What a node knows of the scene.
 
 use hybray_bintree::walk::Resident;
-use hybray_scene::{PageView, Pages};
+use hybray_scene::{PageView, Pages, Texels};
 use hybray_shading as shading;
 
 /// Pages, tables, and what the scene requires.
@@ -17,6 +17,8 @@ pub struct Scene<'a, P: Pages + ?Sized = [PageView<'a>]> {
     pub magnitude: f32,
     /// Whether some material lets light through: if not, any hit ends a shadow ray, and that is cheaper to find.
     pub transmits: bool,
+    /// Pages of texels, behind all others, for who has every page.
+    pub texels: &'a [Texels<'a>],
 }
 
 impl<P: Pages + ?Sized> Clone for Scene<'_, P> {
@@ -28,6 +30,12 @@ impl<P: Pages + ?Sized> Clone for Scene<'_, P> {
 impl<P: Pages + ?Sized> Copy for Scene<'_, P> {}
 
 impl<'a, P: Pages + ?Sized> Scene<'a, P> {
+    /// Whether rays tell how much they stand for.
+    #[must_use]
+    pub fn has_textures(&self) -> bool {
+        !self.shading.maps.textures.is_empty()
+    }
+
     /// The same scene as somebody sees it who has these pages.
     #[must_use]
     pub fn at_hand<'b, Q: Pages + ?Sized>(&self, pages: &'b Q) -> Scene<'b, Q>
@@ -40,6 +48,7 @@ impl<'a, P: Pages + ?Sized> Scene<'a, P> {
             background: self.background,
             magnitude: self.magnitude,
             transmits: self.transmits,
+            texels: self.texels,
         }
     }
 }

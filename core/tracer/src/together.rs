@@ -151,11 +151,13 @@ impl Walker<'_> {
             if walked.needs.is_some() {
                 continue;
             }
-            let ray = sent.spawned.record(record);
+            let ray = sent.spawned.record(record, scene);
+            // What wants a page of texels, or passes what it hit, is traced in its turn.
+            let Ok(next) = begin(scene, &ray, &walked.best, sink, counts, &mut self.counts) else { continue };
             record.adopt(ray.id);
             counts.secondary += 1;
             sink.ended(&record.origin, record.entry());
-            *record = begin(scene, &ray, &walked.best, sink, counts).unwrap_or(HitRecord::EMPTY);
+            *record = next.unwrap_or(HitRecord::EMPTY);
             new[at] = true;
         }
         let (mut stay, mut all) = (0, 0);
@@ -218,7 +220,7 @@ fn trace<S: Sink, P: Pages + ?Sized>(
             sent.spawned.weight
         } else if scene.transmits {
             let Some(page) = resident.pages.page(hit.page) else { continue };
-            if spawn::let_through(&scene.shading, page.material(hit.slot), sent.spawned.weight).is_some() {
+            if spawn::let_through(&scene.shading, page.material(hit.slot), 0.0, sent.spawned.weight).is_some() {
                 continue;
             }
             [0.0; 3]

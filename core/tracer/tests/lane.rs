@@ -121,7 +121,7 @@ fn arriving_by_hand(scene: &Scene<'_>, ray: &Ray, weight: [f32; 3]) -> [f32; 3] 
         ..bytemuck::Zeroable::zeroed()
     };
     let place = surface(&scene.resident.pages[hit.page as usize], &record, &hit).unwrap();
-    let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, weight) else { return [0.0; 3] };
+    let Some((origin, rest)) = spawn::pass_through(&scene.shading, &place, 1.0, weight) else { return [0.0; 3] };
     let end = ray.origin + ray.direction * ray.t_max;
     let direction = if ray.t_max < f32::INFINITY { (end - origin) / ray.t_max } else { ray.direction };
     arriving_by_hand(scene, &Ray { origin, direction, ..*ray }, rest)
@@ -143,11 +143,12 @@ fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
             continue;
         }
         let place = surface(&scene.resident.pages[hit.page as usize], &ray, &hit).unwrap();
-        add(spawn::local(&scene.shading, &place, ray.weight));
+        let facing = spawn::Facing::new(&place, hybray_shading::Look::PLAIN);
+        add(spawn::local(&scene.shading, &facing, [1.0; 3], ray.weight));
         for cursor in 0..spawn::children(&scene.shading, &place) {
             let depth = ray.depth.into();
             let (origin, direction, weight, medium, branch, kind) =
-                match spawn::child(&scene.shading, &spawn::Facing::new(&place), ray.weight, depth, ray.id, cursor) {
+                match spawn::child(&scene.shading, &facing, ray.weight, depth, ray.id, cursor) {
                     spawn::Child::None => continue,
                     spawn::Child::Shadow { origin, direction, t_max, contribution, .. } => {
                         add(arriving_by_hand(scene, &Ray { origin, direction, t_min: 0.0, t_max }, contribution));
@@ -217,7 +218,9 @@ fn a_ledger_with_a_fault_stays_open() {
             let mut known = ray;
             let hit = walker.nearest(scene, &mut known).expect("every page is at hand");
             assert_eq!((known.settled, known.page, known.t_max), (1, hit.page, hit.candidate.t));
-            begin(scene, &known, &hit, &mut sink, &mut counts).into_iter().for_each(|record| lane.push(record));
+            let walks = &mut walk::Counts::default();
+            let begun = begin(scene, &known, &hit, &mut sink, &mut counts, walks).expect("nothing is passed");
+            begun.into_iter().for_each(|record| lane.push(record));
             while !lane.is_empty() {
                 assert_ne!(sink.0, 0, "not zero before the tree has ended");
                 assert_eq!(lane.step(scene, &mut walker, &mut sink, &mut counts), None);
@@ -248,7 +251,8 @@ fn rays_together_bring_what_they_bring_singly() {
                 single.entries = single.entries.wrapping_add(record.entries);
                 single_counts += counted;
                 let hit = walker.nearest(scene, &mut ray).expect("every page is at hand");
-                records.extend(begin(scene, &ray, &hit, &mut together, &mut counts));
+                let walks = &mut walk::Counts::default();
+                records.extend(begin(scene, &ray, &hit, &mut together, &mut counts, walks).expect("nothing is passed"));
             }
             assert_eq!(records.len(), TOGETHER);
             let before = walker.ahead;

@@ -40,7 +40,8 @@ pub struct RayRecord {
     pub hit_page: u32,
     /// What it adds to the film is multiplied by this.
     pub weight: [f32; 3],
-    /// Of a shadow ray that looks for what lets light through: its end, just before the light.
+    /// Of a shadow ray that looks for what lets light through: its end, just before the light. Of others, where there are textures,
+    /// what a pixel sees of the scene ([`RayRecord::footprint`]).
     pub t_end: f32,
     /// Number of the tile.
     pub tile: u32,
@@ -52,9 +53,10 @@ pub struct RayRecord {
     pub home: u16,
     /// Place of the best hit in its page.
     pub slot: u16,
-    /// What it travels in: 0 outside, else a material's number plus 1.
+    /// What it travels in: 0 outside, else a material's number plus 1. Of a shadow ray, where there are textures, the upper half of
+    /// its footprint's width.
     pub medium: u16,
-    /// Surfaces that a shadow ray has passed.
+    /// Surfaces that it has passed.
     pub passed: u16,
     /// Number of the pixel in its tile, row by row.
     pub pixel: u8,
@@ -66,8 +68,8 @@ pub struct RayRecord {
     pub settled: u8,
     /// 1: it was given to a node that had nothing to do, and goes on there. Else 0.
     pub moved: u8,
-    /// Zero.
-    pub reserved: u8,
+    /// Times that it was taken up since its hit is known, and a page of texels was missing.
+    pub tries: u8,
 }
 
 /// A shadow ray that anything ends: 64 bytes. It starts outside all error bounds, so its interval starts at 0.
@@ -150,6 +152,23 @@ impl RayRecord {
         }
     }
 
+    /// Half the width of what it stands for, internal units: where it starts, and what is added with each unit of its way. To
+    /// within 1/256 of themselves.
+    #[must_use]
+    pub const fn footprint(&self) -> [f32; 2] {
+        let bits = self.t_end.to_bits();
+        [f32::from_bits(bits & 0xffff_0000), f32::from_bits(bits << 16)]
+    }
+
+    /// What [`RayRecord::footprint`] is kept as, in [`RayRecord::t_end`]: the upper halves of both. What is negative or no number is
+    /// 0.
+    #[must_use]
+    pub fn packed_footprint(footprint: [f32; 2]) -> f32 {
+        // Half a step up, and cut off; large ones stop at the largest number.
+        let half = |x: f32| if x > 0.0 { (if x < 3.0e38 { x } else { 3.0e38 }).to_bits() + 0x8000 } else { 0 };
+        f32::from_bits(half(footprint[0]) & 0xffff_0000 | half(footprint[1]) >> 16)
+    }
+
     /// The best hit so far.
     #[must_use]
     pub fn candidate(&self) -> Candidate {
@@ -214,10 +233,33 @@ mod tests {
         }
         at!(RayRecord: origin 0, direction 12, t_min 24, t_max 28, id 32, primitive 40, hit_page 44, weight 48, t_end 60,
             tile 64, page 68, epoch 72, home 74, slot 76, medium 78, passed 80, pixel 82, kind 83, depth 84, settled 85,
-            moved 86, reserved 87);
+            moved 86, tries 87);
         at!(ShadowRecord: origin 0, direction 12, t_max 24, home 28, pixel 30, depth 31, id 32, contribution 40, tile 52,
             page 56, epoch 60, moved 62, reserved 63);
         at!(Partial: sums 0, entry 24, tile 32, epoch 36, pixel 38, reserved 39);
+    }
+
+    #[test]
+    fn footprints_keep_eight_bits() {
+        for i in 0..20_000u32 {
+            let number = |seed: u32| from_bits(i.wrapping_mul(2_654_435_761).wrapping_add(seed));
+            let footprint = [number(1), number(2)];
+            let packed = RayRecord::packed_footprint(footprint);
+            assert!(packed.is_finite());
+            let found = RayRecord { t_end: packed, ..RayRecord::zeroed() }.footprint();
+            for (found, wanted) in found.into_iter().zip(footprint) {
+                assert!((found - wanted).abs() <= wanted / 256.0, "{found} {wanted}");
+            }
+        }
+        for odd in [-1.0, f32::NAN] {
+            assert_eq!(RayRecord::packed_footprint([odd, odd]), 0.0);
+        }
+        assert!(RayRecord::packed_footprint([f32::INFINITY, f32::INFINITY]).is_finite());
+    }
+
+    /// A positive normal number from bits.
+    fn from_bits(bits: u32) -> f32 {
+        f32::from_bits(0x0100_0000 + bits % 0x7c00_0000)
     }
 
     /// What a short record leaves out is what every shadow ray has alike where nothing lets light through.
@@ -241,7 +283,7 @@ mod tests {
         let ray = RayRecord::from(&short);
         assert_eq!(ShadowRecord::from(&ray), short);
         assert_eq!((ray.ray_kind(), ray.primitive, ray.t_min), (RayKind::Shadow, Candidate::NOTHING, 0.0));
-        assert_eq!((ray.settled, ray.passed, ray.medium, ray.moved, ray.reserved), (0, 0, 0, 1, 0));
+        assert_eq!((ray.settled, ray.passed, ray.medium, ray.moved, ray.tries), (0, 0, 0, 1, 0));
         assert_eq!((ray.weight, ray.t_max, ray.page), (short.contribution, 0.75, 15));
     }
 }

@@ -16,7 +16,7 @@ pub use objects::{Object, Objects};
 pub use packed::{Packed, Pages, hash_bytes};
 pub use source::Source;
 
-pub(crate) use packed::{Index, hash_page, primitives_in};
+pub(crate) use packed::{Index, geometry_pages, hash_page, primitives_in};
 pub(crate) use two_pass::{build_in_two_passes, voxels_for};
 
 use crate::model::Model;
@@ -140,7 +140,10 @@ pub fn build(model: &Model, settings: &Settings) -> Result<Packed, BuildError> {
             }
         }
     }
-    Ok(Packed::new(assembler.finish(), pages, scale_log2, model.materials.len()))
+    let mut index = assembler.finish();
+    let (textures, texels) = index.add_textures(&model.textures, settings.page_bytes);
+    pages.extend(texels);
+    Ok(Packed::new(index, pages, scale_log2, model.materials.len(), textures))
 }
 
 /// The items of each voxel, each with the part of its box in there, and the boxes around those.

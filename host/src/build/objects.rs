@@ -5,9 +5,9 @@ use crate::model::Model;
 use bytemuck::{Pod, Zeroable};
 use hybray_bintree::cut::Primitives;
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
-use hybray_scene::Kind;
+use hybray_scene::{Colours, Coordinates, Header, Kind};
 
-/// A primitive, in file units or the internal unit: 56 bytes.
+/// A primitive, in file units or the internal unit: 92 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Object {
@@ -15,25 +15,31 @@ pub struct Object {
     shape: [f32; 9],
     /// Packed vertex normals, if `form` says so.
     normals: [u32; 3],
+    /// Of a triangle, if `attributes` says so.
+    coordinates: Coordinates,
+    colours: Colours,
     id: u32,
     material: u16,
     /// 0 a triangle, 1 a triangle with normals, 2 a sphere, 3 a cone.
-    form: u16,
+    form: u8,
+    /// [`Header::attributes`] of a triangle.
+    attributes: u8,
 }
 
-const _: () = assert!(size_of::<Object>() == 56);
+const _: () = assert!(size_of::<Object>() == 92);
 
-const TRIANGLE: u16 = 0;
-const SMOOTH: u16 = 1;
-const SPHERE: u16 = 2;
-const CONE: u16 = 3;
+const TRIANGLE: u8 = 0;
+const SMOOTH: u8 = 1;
+const SPHERE: u8 = 2;
+const CONE: u8 = 3;
 
 impl Object {
     /// A triangle.
     #[must_use]
     pub fn triangle(id: u32, material: u16, corners: [[f32; 3]; 3], normals: Option<[u32; 3]>) -> Self {
         let form = if normals.is_some() { SMOOTH } else { TRIANGLE };
-        Self { shape: bytemuck::cast(corners), normals: normals.unwrap_or([0; 3]), id, material, form }
+        let normals = normals.unwrap_or([0; 3]);
+        Self { shape: bytemuck::cast(corners), normals, id, material, form, ..Zeroable::zeroed() }
     }
 
     /// The primitive `id` of a source.
@@ -42,7 +48,13 @@ impl Object {
         let mut shape = [0.0; 9];
         let form = match source.aabb(id).0 {
             Kind::Triangle => {
-                return Self::triangle(id, material, source.triangle(id).v.map(|v| v.to_array()), source.normals(id));
+                let corners = source.triangle(id).v.map(|v| v.to_array());
+                return Self {
+                    coordinates: source.coordinates(id).unwrap_or_default(),
+                    colours: source.colours(id).unwrap_or_default(),
+                    attributes: source.attributes(id) as u8,
+                    ..Self::triangle(id, material, corners, source.normals(id))
+                };
             }
             Kind::Sphere => {
                 let s = source.sphere(id);
@@ -59,7 +71,7 @@ impl Object {
                 CONE
             }
         };
-        Self { shape, normals: [0; 3], id, material, form }
+        Self { shape, id, material, form, ..Zeroable::zeroed() }
     }
 
     /// All lengths times a power of two.
@@ -123,6 +135,14 @@ impl Primitives for Held<'_> {
     fn normals(&self, number: u32) -> Option<[u32; 3]> {
         let object = &self.0[number as usize];
         object.is_smooth().then_some(object.normals)
+    }
+    fn coordinates(&self, number: u32) -> Option<Coordinates> {
+        let object = &self.0[number as usize];
+        (u32::from(object.attributes) & Header::COORDINATES != 0).then_some(object.coordinates)
+    }
+    fn colours(&self, number: u32) -> Option<Colours> {
+        let object = &self.0[number as usize];
+        (u32::from(object.attributes) & Header::COLOURS != 0).then_some(object.colours)
     }
 }
 

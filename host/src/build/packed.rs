@@ -9,8 +9,10 @@ use hybray_bintree::walk::Resident;
 use hybray_bintree::{Forest, top};
 use hybray_geometry::Aabb;
 use hybray_scene::{
-    BLOCK, Directory, Header, Kind, Line, Node, PageEntry, PageForm, PageView, Slot, Tables, lines_for,
+    BLOCK, Coordinates, Directory, Header, Kind, Line, Node, PageEntry, PageForm, PageView, Slot, Tables, Texels,
+    lines_for,
 };
+use hybray_shading::Texture;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -41,6 +43,8 @@ pub struct Packed {
     pub magnitude: f32,
     /// Materials that pages may refer to.
     pub materials: usize,
+    /// Textures, whose pages come behind the others.
+    pub textures: Vec<Texture>,
 }
 
 const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
@@ -81,6 +85,7 @@ pub(crate) fn primitives_in(page: &PageView<'_>) -> u32 {
 pub struct Pages<'a> {
     packed: &'a Packed,
     views: Vec<PageView<'a>>,
+    texels: Vec<Texels<'a>>,
 }
 
 impl Packed {
@@ -88,7 +93,13 @@ impl Packed {
     ///
     /// # Panics
     /// If there are 256 GiB of them.
-    pub(crate) fn new(index: Index, chunks: Vec<Vec<Line>>, scale_log2: i32, materials: usize) -> Self {
+    pub(crate) fn new(
+        index: Index,
+        chunks: Vec<Vec<Line>>,
+        scale_log2: i32,
+        materials: usize,
+        textures: Vec<Texture>,
+    ) -> Self {
         let area = Area::new(chunks);
         let mut line = 0;
         let places = index.entries.iter().map(|entry| {
@@ -98,7 +109,7 @@ impl Packed {
         });
         let places = places.collect();
         let magnitude = index.nodes.first().map_or(0.0, |n| n.bounds().magnitude());
-        Self { index, area, places, scale_log2, magnitude, materials }
+        Self { index, area, places, scale_log2, magnitude, materials, textures }
     }
 
     /// Bytes of all pages.
@@ -135,7 +146,19 @@ impl Packed {
     #[must_use]
     pub fn compact_pages(&self) -> usize {
         let header = |page| -> &Header { bytemuck::from_bytes(&self.page(page)[0].0) };
-        (0..self.pages() as u32).filter(|&page| header(page).form() == PageForm::Compact).count()
+        (0..self.geometry_pages()).filter(|&page| header(page).form() == PageForm::Compact).count()
+    }
+
+    /// How many pages have nodes and primitives: they come before those of texels.
+    #[must_use]
+    pub fn geometry_pages(&self) -> u32 {
+        geometry_pages(&self.index.entries)
+    }
+
+    /// Bytes of pages of texels.
+    #[must_use]
+    pub fn texel_bytes(&self) -> u64 {
+        self.index.entries[self.geometry_pages() as usize..].iter().map(|e| u64::from(e.bytes)).sum()
     }
 
     /// The bytes of a page, padded to whole lines.
@@ -204,13 +227,18 @@ impl Packed {
     /// If the builder, or memory, is broken.
     pub fn open(&self) -> Result<Pages<'_>, BuildError> {
         let tables = Tables { materials: self.materials };
-        let views = (0..self.pages() as u32)
+        let geometry = self.geometry_pages();
+        let views = (0..geometry)
             .into_par_iter()
             .map(|page| PageView::parse(self.page(page), tables))
             .collect::<Result<Vec<_>, _>>()?;
+        let texels = (geometry..self.pages() as u32)
+            .into_par_iter()
+            .map(|page| Texels::parse(bytemuck::cast_slice(self.page(page))))
+            .collect::<Result<Vec<_>, _>>()?;
         let Index { nodes, entries, .. } = &self.index;
         Directory::parse(nodes, entries, &mut vec![0; nodes.len() + entries.len()])?;
-        Ok(Pages { packed: self, views })
+        Ok(Pages { packed: self, views, texels })
     }
 }
 
@@ -219,6 +247,32 @@ impl<'a> Pages<'a> {
     #[must_use]
     pub fn resident(&'a self) -> Resident<'a> {
         Resident { directory: self.packed.directory(), pages: &self.views }
+    }
+
+    /// Pages of texels, in their order behind the others.
+    #[must_use]
+    pub fn texels(&'a self) -> &'a [Texels<'a>] {
+        &self.texels
+    }
+
+    /// Adds to a hash what textures show: the same however they are cut into pages.
+    #[must_use]
+    pub fn hash_textures(&self, hash: u64) -> u64 {
+        let first = self.packed.geometry_pages();
+        self.packed.textures.iter().fold(hash, |hash, texture| {
+            let hash = hash_bytes(hash, bytemuck::bytes_of(&Texture { first: 0, tile: 0, pages: 0, ..*texture }));
+            let [width, height] = texture.level_size(0);
+            let (tile, columns) = (u32::from(texture.tile), texture.squares(0)[0]);
+            (0..height).fold(hash, |hash, y| {
+                let row: Vec<[u8; 4]> = (0..width)
+                    .map(|x| {
+                        let page = texture.first - first + y / tile * columns + x / tile;
+                        self.texels[page as usize].get((x % tile) as i32, (y % tile) as i32)
+                    })
+                    .collect();
+                hash_bytes(hash, row.as_flattened())
+            })
+        })
     }
 
     /// Hash of the primitives, each counted once: equal for equal ones, however they are cut into pages.
@@ -235,11 +289,20 @@ impl<'a> Pages<'a> {
             let mut sum = 0u64;
             let mut add = |kind: Kind, number: usize, id: u32, shape: &[f32], normals: &[u32]| {
                 if is_new(id) {
+                    let of_triangle = kind == Kind::Triangle;
+                    let coordinates = page.coordinates.get(number).filter(|_| of_triangle);
+                    let colours = page.colours.get(number).filter(|_| of_triangle);
                     let about = [id, kind as u32, page.material(Slot::new(kind, number)).into()];
                     let parts: [&[u8]; 3] =
                         [bytemuck::cast_slice(&about), bytemuck::cast_slice(shape), bytemuck::cast_slice(normals)];
+                    // What stands in a page only because others of it have it counts as what it means: nothing.
+                    let more = [
+                        coordinates.filter(|c| **c != Coordinates::default()).map(|c| bytemuck::bytes_of(c)),
+                        colours.filter(|c| **c != [[u8::MAX; 4]; 3]).map(|c| bytemuck::bytes_of(c)),
+                    ];
                     // A sum: it is the same in any order.
-                    sum = sum.wrapping_add(parts.into_iter().fold(HASH_START, hash_bytes));
+                    let hash = parts.into_iter().chain(more.into_iter().flatten()).fold(HASH_START, hash_bytes);
+                    sum = sum.wrapping_add(hash);
                 }
             };
             for number in 0..page.body.triangle_lanes() {
@@ -267,6 +330,22 @@ impl Index {
     /// What the hash of pages starts from.
     pub const HASH_START: u64 = HASH_START;
 
+    /// Adds textures' pages behind the others, shared out among the voxels; returns their table.
+    pub fn add_textures(
+        &mut self,
+        textures: &[crate::texture::Texture],
+        page_bytes: usize,
+    ) -> (Vec<Texture>, Vec<Vec<Line>>) {
+        let (records, pages) = crate::texture::pages(textures, page_bytes, self.entries.len() as u32);
+        for (number, lines) in (0u32..).zip(&pages) {
+            let bytes = Texels::parse(bytemuck::cast_slice(lines)).map_or(0, |texels| texels.bytes() as u32);
+            self.entries.push(PageEntry { bytes, owner: 0, kind: PageEntry::TEXELS });
+            self.voxels.push(number % self.voxel_count.max(1));
+            self.add_page(0, hash_page(lines));
+        }
+        (records, pages)
+    }
+
     /// Adds what is known of the next page.
     pub fn add_page(&mut self, primitives: u32, hash: u64) {
         self.primitives.push(primitives);
@@ -277,6 +356,11 @@ impl Index {
     pub fn hash(&self) -> u64 {
         hash_bytes(hash_bytes(self.hash, bytemuck::cast_slice(&self.nodes)), bytemuck::cast_slice(&self.entries))
     }
+}
+
+/// How many of the pages, the first ones, have nodes and primitives.
+pub(crate) fn geometry_pages(entries: &[PageEntry]) -> u32 {
+    entries.partition_point(|entry| entry.kind == PageEntry::GEOMETRY) as u32
 }
 
 /// Puts the trees of voxels below the planes between them, and the directory above their pages. Told in preorder.

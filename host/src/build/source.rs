@@ -4,7 +4,7 @@ use super::{BuildError, TooMany};
 use crate::model::Model;
 use hybray_bintree::cut::{FLAT, Primitives};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
-use hybray_scene::Kind;
+use hybray_scene::{Colours, Coordinates, Kind};
 use hybray_shading::pack_normal;
 use rayon::prelude::*;
 
@@ -129,5 +129,17 @@ impl Primitives for Source<'_> {
                 if n.length_squared() > 0.0 { pack_normal(n / n.length()) } else { FLAT }
             })
         })
+    }
+
+    fn coordinates(&self, id: u32) -> Option<Coordinates> {
+        let (part, number) = self.place(id);
+        let mesh = self.model.meshes.get(part).filter(|mesh| !mesh.coordinates.is_empty())?;
+        Some(mesh.triangles[number].map(|v| mesh.coordinates[v as usize]))
+    }
+
+    fn colours(&self, id: u32) -> Option<Colours> {
+        let (part, number) = self.place(id);
+        let mesh = self.model.meshes.get(part).filter(|mesh| !mesh.colours.is_empty())?;
+        Some(mesh.triangles[number].map(|v| mesh.colours[v as usize]))
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! The first pass finds the scale, and a sample for the planes between voxels; the second writes each object to the
 //! voxels that it reaches into, in a file; then the source is dropped, and voxel by voxel is read, built, and told as
-//! pages. What is held at once is the largest voxel (about 56 + 32 bytes an object, and its pages), the directory, and
+//! pages. What is held at once is the largest voxel (about 92 + 32 bytes an object, and its pages), the directory, and
 //! buffers of 32 MiB at most.
 //!
 //! The pages are those of [`super::build`] with the same settings, byte for byte.
@@ -186,7 +186,7 @@ mod tests {
         })
         .unwrap();
         assert_eq!((survey.primitives, survey.smooth), ([triangles, spheres, cones], smooth), "{name}");
-        let packed = Packed::new(index, vec![lines], survey.scale_log2, materials);
+        let packed = Packed::new(index, vec![lines], survey.scale_log2, materials, Vec::new());
         assert_eq!(packed.hash(), expected.hash(), "{name} {voxels:?} {rule:?}");
         assert_eq!(packed.scale_log2, expected.scale_log2);
         packed.open().unwrap();

@@ -37,7 +37,7 @@ pub(crate) fn model() -> Model {
         material: 0,
         ..plain.clone()
     };
-    let named = |name: &str, material| NamedMaterial { name: name.to_owned(), material };
+    let named = |name: &str, material| NamedMaterial { name: name.to_owned(), material, ..Default::default() };
     let nff = Material {
         diffuse: [0.1, 0.2, 0.3],
         specular: [0.4; 3],
@@ -123,7 +123,7 @@ fn reread_nff(text: &str) -> (Model, CameraSpec) {
                 assert_eq!(v.len(), 8);
                 let rgb = three(&v);
                 let material = crate::nff_material::nff_material(rgb, v[3], v[4], v[5], v[6], v[7]);
-                model.materials.push(NamedMaterial { name: String::new(), material });
+                model.materials.push(NamedMaterial { material, ..Default::default() });
             }
             "s" => model.spheres.push(Sphere { centre: three(&v), radius: v[3], material }),
             "c" => {

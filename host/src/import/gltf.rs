@@ -1,4 +1,4 @@
-//! glTF 2.0 and GLB through the crate `gltf`: meshes, the node hierarchy, cameras and punctual lights.
+//! glTF 2.0 and GLB through the crate `gltf`: meshes, the node hierarchy, materials, textures, cameras and punctual lights.
 //!
 //! The crate reads and checks the JSON; what it takes on trust is checked here: the lengths in a GLB's header (it overflows on one
 //! that is too short), that every accessor lies within its buffer, that no node is its own ancestor or has two parents, and
@@ -8,21 +8,23 @@
 //! triangles of the file that makes.
 
 use super::error::{ImportError, Warnings, quote};
-use super::mtl;
 use super::obj::units;
-use super::physical::Physical;
 use super::polygon::{has_area, unit};
 use super::{guarded, open};
 use crate::model::{CameraSpec, Mesh, Model};
+use crate::picture::encode_srgb8;
+use crate::texture::Image;
 use gltf::accessor::{Accessor, DataType, Dimensions};
 use gltf::camera::Projection;
 use gltf::khr_lights_punctual::Kind;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
-use hybray_shading::{Light, LightKind, Material};
+use hybray_shading::{Light, LightKind};
+use materials::Placed;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a file may say that it cannot be read without.
 const EXTENSIONS: [&str; 9] = [
@@ -62,6 +64,8 @@ pub(super) fn read(bytes: &[u8], file: &str, folder: &Path) -> Result<Model, Imp
         model: Model::default(),
         warnings: Warnings::default(),
         materials: BTreeMap::new(),
+        images: BTreeMap::new(),
+        folder,
         used: BTreeSet::new(),
         stored: 0,
         made: 0,
@@ -252,7 +256,11 @@ struct Reader<'a> {
     model: Model,
     warnings: Warnings,
     /// Of the file's materials, by index, those that were met: where they stand in the model.
-    materials: BTreeMap<Option<usize>, u16>,
+    materials: BTreeMap<(Option<usize>, bool), Placed>,
+    /// Pictures that were met, and whether each is one of light; `None` if it cannot be used.
+    images: BTreeMap<usize, Option<(Arc<Image>, bool)>>,
+    /// Where other files are looked for.
+    folder: &'a Path,
     /// Meshes that were met.
     used: BTreeSet<usize>,
     /// Triangles of those.
@@ -326,8 +334,12 @@ impl Reader<'_> {
             }
             let (normals_place, mirrored) = place.normals();
             let Some((positions, normals, triangles)) = self.triangles(&primitive, &what)? else { continue };
-            let material = self.material(&primitive)?;
-            let Some(material) = material else { continue };
+            let colours = self.colours(&primitive, positions.len(), &what)?;
+            let Some(material) = self.material(&primitive, !colours.is_empty())? else { continue };
+            let coordinates = match material.set {
+                Some(set) => self.coordinates(&primitive, set, positions.len(), &what)?,
+                None => Vec::new(),
+            };
             let placed: Vec<[f32; 3]> = positions.iter().map(|&p| place.point(p)).collect();
             let count = triangles.len() as u64;
             let triangles: Vec<[u32; 3]> = triangles
@@ -345,7 +357,8 @@ impl Reader<'_> {
             }
             let normals = normals.iter().map(|n| normals_place.unit(n.map(f64::from))).collect();
             let normals = units(normals, &placed, &triangles);
-            let mesh = Mesh { name: name.to_owned(), positions: placed, normals, triangles, material };
+            let (name, material) = (name.to_owned(), material.index);
+            let mesh = Mesh { name, positions: placed, normals, coordinates, colours, triangles, material };
             self.model.meshes.push(mesh);
         }
         Ok(())
@@ -406,6 +419,54 @@ impl Reader<'_> {
         Ok(Some((positions, normals, triangles)))
     }
 
+    /// Texture coordinates of each vertex, or none.
+    fn coordinates(
+        &mut self,
+        primitive: &gltf::Primitive<'_>,
+        set: u32,
+        count: usize,
+        what: &str,
+    ) -> Result<Vec<[f32; 2]>, ImportError> {
+        let Some(accessor) = primitive.get(&gltf::Semantic::TexCoords(set)) else {
+            self.warn("a mesh whose material has textures has no coordinates for them: it shows one texel");
+            return Ok(Vec::new());
+        };
+        self.check(&accessor, &[DataType::F32, DataType::U8, DataType::U16], Dimensions::Vec2, what)?;
+        let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
+        let coordinates = reader.read_tex_coords(set).map(|c| c.into_f32().collect::<Vec<_>>());
+        self.of_each(coordinates, count, what, "texture coordinates")
+    }
+
+    /// The colour of each vertex, or none.
+    fn colours(
+        &mut self,
+        primitive: &gltf::Primitive<'_>,
+        count: usize,
+        what: &str,
+    ) -> Result<Vec<[u8; 4]>, ImportError> {
+        let Some(accessor) = primitive.get(&gltf::Semantic::Colors(0)) else { return Ok(Vec::new()) };
+        let types = [DataType::F32, DataType::U8, DataType::U16];
+        let dimensions = if accessor.dimensions() == Dimensions::Vec3 { Dimensions::Vec3 } else { Dimensions::Vec4 };
+        self.check(&accessor, &types, dimensions, what)?;
+        let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
+        let encoded = |[r, g, b, a]: [f32; 4]| {
+            let [r, g, b] = [r, g, b].map(|c| encode_srgb8(c));
+            [r, g, b, (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
+        };
+        let colours = reader.read_colors(0).map(|c| c.into_rgba_f32().map(encoded).collect::<Vec<_>>());
+        self.of_each(colours, count, what, "colours")
+    }
+
+    /// `values`, if there is one for each vertex.
+    fn of_each<T>(&self, values: Option<Vec<T>>, count: usize, what: &str, of: &str) -> Result<Vec<T>, ImportError> {
+        let values = values.ok_or_else(|| self.error(format!("{what} cannot be read"), "export the file again"))?;
+        if values.len() != count {
+            let problem = format!("{what} has {} {of} for {count} positions", values.len());
+            return Err(self.error(problem, "export the file again"));
+        }
+        Ok(values)
+    }
+
     /// That an accessor is of the kind that is wanted and lies within its buffer.
     fn check(
         &self,
@@ -458,53 +519,6 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Where a primitive's material stands in the model; `None` if nothing of it is seen.
-    fn material(&mut self, primitive: &gltf::Primitive<'_>) -> Result<Option<u16>, ImportError> {
-        if primitive.get(&gltf::Semantic::Colors(0)).is_some() {
-            self.warn("colours of vertices are not used");
-        }
-        let from = primitive.material();
-        let pbr = from.pbr_metallic_roughness();
-        let is_cut = from.alpha_mode() == AlphaMode::Mask
-            && pbr.base_color_texture().is_none()
-            && pbr.base_color_factor()[3] < from.alpha_cutoff().unwrap_or(0.5);
-        if is_cut {
-            return Ok(None);
-        }
-        if let Some(&index) = self.materials.get(&from.index()) {
-            return Ok(Some(index));
-        }
-        let textures = [
-            (pbr.base_color_texture().is_some(), "base colours"),
-            (pbr.metallic_roughness_texture().is_some(), "metalness and roughness"),
-            (from.normal_texture().is_some(), "normals"),
-            (from.occlusion_texture().is_some(), "occlusion"),
-            (from.emissive_texture().is_some(), "emission"),
-            (from.transmission().is_some_and(|t| t.transmission_texture().is_some()), "transmission"),
-        ];
-        for (is_there, of) in textures {
-            if is_there {
-                self.warn(&format!("textures of {of} are not used"));
-            }
-        }
-        if (0.05..1.0).contains(&pbr.roughness_factor()) && pbr.metallic_factor() > 0.0 {
-            self.warn("rough metal is drawn with a highlight and a matt share, not with blurred reflections");
-        }
-        if from.volume().is_some() {
-            self.warn("absorption within volumes is not used");
-        }
-        if self.model.materials.len() >= usize::from(u16::MAX) {
-            return Err(self.error("more than 65,535 materials", "use fewer materials"));
-        }
-        let name = from
-            .name()
-            .map_or_else(|| from.index().map_or("default".into(), |i| format!("material {i}")), str::to_owned);
-        let material = if from.index().is_some() { translated(&from) } else { mtl::DEFAULT };
-        let index = self.model.add_material(&name, material);
-        self.materials.insert(from.index(), index);
-        Ok(Some(index))
-    }
-
     fn camera(&mut self, node: &gltf::Node<'_>, camera: &gltf::Camera<'_>, place: &Place) {
         let name = camera.name().or(node.name()).map_or_else(|| format!("camera {}", camera.index()), str::to_owned);
         let Projection::Perspective(perspective) = camera.projection() else {
@@ -553,25 +567,6 @@ const MADE_MAX: u64 = 1 << 26;
 /// Values of an accessor that has no bytes but for its sparse part.
 const UNSTORED_MAX: usize = 1 << 20;
 
-/// A material in Whitted's model: see [`Physical`].
-fn translated(from: &gltf::Material<'_>) -> Material {
-    let pbr = from.pbr_metallic_roughness();
-    let [r, g, b, alpha] = pbr.base_color_factor();
-    let base = [r, g, b];
-    if from.unlit() {
-        return Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission: base, ..Material::MATT };
-    }
-    let physical = Physical {
-        base,
-        metal: pbr.metallic_factor(),
-        rough: pbr.roughness_factor(),
-        through: from.transmission().map_or(0.0, |t| t.transmission_factor()),
-        ior: from.ior().unwrap_or(1.5),
-        seen: if from.alpha_mode() == AlphaMode::Blend { alpha } else { 1.0 },
-        emission: from.emissive_factor().map(|c| c * from.emissive_strength().unwrap_or(1.0)),
-    };
-    physical.material()
-}
-
+mod materials;
 #[cfg(test)]
 mod tests;

@@ -30,7 +30,7 @@ use super::error::{ImportError, Warnings, quote};
 use super::guarded;
 use super::lines::{Lines, without_comment};
 use super::physical::Physical;
-use hybray_shading::{Highlight, Material};
+use hybray_shading::{Highlight, Maps, Material};
 use std::fmt::Write as _;
 use std::io::BufRead;
 
@@ -40,13 +40,12 @@ const FILE_BYTES_MAX: usize = 1 << 24;
 /// The grey of a surface that no material is said of.
 pub(crate) const DEFAULT: Material = Material { ambient: Material::MATT.diffuse, ..Material::MATT };
 
+/// A material, its name, and what it takes from textures.
+pub(crate) type Described = (String, (Material, Maps));
+
 /// The materials of a file in its order, names as they stand there. A name that comes twice stands twice: the last
 /// one is meant.
-pub(crate) fn read(
-    reader: impl BufRead,
-    file: &str,
-    warnings: &mut Warnings,
-) -> Result<Vec<(String, Material)>, ImportError> {
+pub(crate) fn read(reader: impl BufRead, file: &str, warnings: &mut Warnings) -> Result<Vec<Described>, ImportError> {
     let checked = check(Lines::new(reader, file, true), warnings)?;
     let parsed = guarded(|| tobj::load_mtl_buf(&mut checked.as_bytes()));
     match parsed {
@@ -166,7 +165,7 @@ fn numbers<R: BufRead>(
 }
 
 /// The table of the module's page.
-fn material(m: &tobj::Material) -> Material {
+fn material(m: &tobj::Material) -> (Material, Maps) {
     let extra = |key: &str| {
         let text = m.unknown_param.get(key)?;
         let mut numbers = text.split_whitespace().map_while(|word| word.parse::<f32>().ok());
@@ -180,7 +179,7 @@ fn material(m: &tobj::Material) -> Material {
     let opacity = m.dissolve.or_else(|| extra("Tr").map(|t| 1.0 - t[0]));
     if illum == 0 {
         let emission = [0, 1, 2].map(|i| emission[i] + diffuse[i]);
-        return Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission, ..Material::MATT };
+        return (Material { diffuse: [0.0; 3], ambient: [0.0; 3], emission, ..Material::MATT }, Maps::EMPTY);
     }
     let exponent = m.shininess.unwrap_or(0.0);
     let glass = matches!(illum, 4 | 6 | 7 | 9);
@@ -196,6 +195,7 @@ fn material(m: &tobj::Material) -> Material {
             ior: m.optical_density.unwrap_or(1.5),
             seen: if glass { 1.0 } else { rest },
             emission,
+            absorption: [0.0; 3],
         }
         .material();
     }
@@ -207,7 +207,7 @@ fn material(m: &tobj::Material) -> Material {
     };
     let rest = if glass { 1.0 } else { opacity.unwrap_or(1.0) };
     let mirror = if matches!(illum, 3..=6 | 8 | 9) { specular } else { [0.0; 3] };
-    Material {
+    let material = Material {
         diffuse: diffuse.map(|c| c * rest),
         ambient: m.ambient.unwrap_or(diffuse).map(|c| c * rest),
         emission: emission.map(|c| c * rest),
@@ -218,14 +218,15 @@ fn material(m: &tobj::Material) -> Material {
         ior: if matches!(illum, 5..=7) { m.optical_density.unwrap_or(1.0) } else { 1.0 },
         highlight: if shines { Highlight::Blinn } else { Highlight::None } as u32,
         flags: if matches!(illum, 5 | 7) { Material::FRESNEL } else { 0 },
-    }
+    };
+    (material, Maps::EMPTY)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    type Parsed = (Vec<(String, Material)>, Vec<String>);
+    type Parsed = (Vec<Described>, Vec<String>);
 
     fn parse(text: &str) -> Result<Parsed, String> {
         let mut warnings = Warnings::default();
@@ -237,7 +238,7 @@ mod tests {
         let (found, warnings) = parse(&format!("newmtl a\n{body}")).expect(body);
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!(found.len(), 1);
-        found[0].1
+        found[0].1.0
     }
 
     const PLAIN: Material = Material { diffuse: [0.5, 0.25, 1.0], ambient: [0.5, 0.25, 1.0], ..Material::MATT };
@@ -309,7 +310,7 @@ mod tests {
         let (found, _) = parse("newmtl red one\nnewmtl b\r\nKd 1 0 0\nnewmtl b").expect("reads");
         let names: Vec<&str> = found.iter().map(|(n, _)| n.as_str()).collect();
         assert_eq!(names, ["red one", "b", "b"]);
-        assert_eq!(found[1].1.diffuse, [1.0, 0.0, 0.0]);
+        assert_eq!(found[1].1.0.diffuse, [1.0, 0.0, 0.0]);
         assert_eq!(parse("").expect("reads").0, []);
     }
 

@@ -173,7 +173,11 @@ pub(super) fn read<R: BufRead>(reader: R, file: &str) -> Result<Model, ImportErr
                 }
                 if usize::from(index) == next {
                     let material = nff_material([r, g, b], kd, ks, shine, t, ior);
-                    model.materials.push(NamedMaterial { name: format!("f{}", fills.len()), material });
+                    model.materials.push(NamedMaterial {
+                        name: format!("f{}", fills.len()),
+                        material,
+                        ..Default::default()
+                    });
                 }
                 fill = Some(index);
             }

@@ -23,7 +23,7 @@ use super::meshes::Meshes;
 use super::polygon::{CORNERS_MAX, Polygons, has_area, unit};
 use super::{COORDINATE_MAX, Opened, guarded, mtl, open};
 use crate::model::{Mesh, Model, NamedMaterial};
-use hybray_shading::Material;
+use hybray_shading::{Maps, Material};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, Read, Write as _};
 use std::path::Path;
@@ -50,7 +50,7 @@ pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
 }
 
 /// What a `mtllib` line brought.
-pub(super) type Library = Result<(Vec<(String, Material)>, Vec<String>), MaterialFile>;
+pub(super) type Library = Result<(Vec<mtl::Described>, Vec<String>), MaterialFile>;
 
 /// Why it brought nothing.
 pub(super) enum MaterialFile {
@@ -141,7 +141,7 @@ fn to_mesh(piece: tobj::Mesh, about: &Piece, polygons: &mut Polygons, dropped: &
         *dropped += u64::from(triangles.len() == before);
     }
     let normals = if normals.len() == positions.len() { units(normals, &positions, &triangles) } else { Vec::new() };
-    Mesh { name: about.name.clone(), positions, normals, triangles, material: about.material }
+    Mesh { name: about.name.clone(), positions, normals, triangles, material: about.material, ..Mesh::default() }
 }
 
 /// Normals at length 1; those without a length become the mean of the triangles around.
@@ -200,7 +200,7 @@ struct Guard<'a, R> {
     /// Material that the file has chosen, and its index once a face has it.
     chosen: Option<String>,
     chosen_index: Option<u16>,
-    known: BTreeMap<String, Material>,
+    known: BTreeMap<String, (Material, Maps)>,
     /// What stood in the `mtllib` lines so far.
     loaded: BTreeSet<String>,
     indices: BTreeMap<String, u16>,
@@ -315,15 +315,16 @@ impl<'a, R: BufRead> Guard<'a, R> {
             let text = format!("the material {} is not in any material file, the default is used", quote(name));
             self.warnings.add(self.lines.number(), &text);
         }
-        let (name, material) = known.unwrap_or_else(|| ("default".to_owned(), mtl::DEFAULT));
+        let (name, (material, maps)) = known.unwrap_or_else(|| ("default".to_owned(), (mtl::DEFAULT, Maps::EMPTY)));
+        let is_same = |m: &NamedMaterial| (m.material, m.maps) == (material, maps);
         let index = match self.indices.get(&name) {
-            Some(&index) if self.materials.get(usize::from(index)).is_some_and(|m| m.material == material) => index,
+            Some(&index) if self.materials.get(usize::from(index)).is_some_and(is_same) => index,
             _ => {
                 let next = u16::try_from(self.materials.len()).unwrap_or(u16::MAX);
                 if next == u16::MAX {
                     return Err(self.lines.error("more than 65,535 materials", "use fewer materials"));
                 }
-                self.materials.push(NamedMaterial { name: name.clone(), material });
+                self.materials.push(NamedMaterial { name: name.clone(), material, maps });
                 self.indices.insert(name, next);
                 next
             }

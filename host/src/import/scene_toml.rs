@@ -14,7 +14,7 @@ use super::toml_values::{Maybe, Source};
 use super::transform::Transform;
 use super::{Format, MODELS, builtin_model, mtl, open, validate};
 use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
-use hybray_shading::{Highlight, Light, LightKind, Material};
+use hybray_shading::{Highlight, Light, LightKind, Map, Maps, Material};
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::ops::Range;
@@ -186,11 +186,23 @@ impl Builder<'_> {
         }
         let all = table.material.as_ref().map(|name| self.own_material(name)).transpose()?;
         let mut map = Vec::with_capacity(other.materials.len());
-        for NamedMaterial { name, material } in std::mem::take(&mut other.materials) {
+        let textures: Vec<u32> =
+            std::mem::take(&mut other.textures).into_iter().map(|t| self.model.add_texture(t)).collect();
+        let uses: Vec<u16> = std::mem::take(&mut other.uses)
+            .into_iter()
+            .map(|map| {
+                let texture = textures.get(map.texture as usize).copied().unwrap_or(u32::MAX);
+                self.model.add_use(Map { texture, ..map })
+            })
+            .collect();
+        for NamedMaterial { name, material, mut maps } in std::mem::take(&mut other.materials) {
+            for map in &mut maps.maps {
+                *map = uses.get(usize::from(*map)).copied().unwrap_or(Maps::NONE);
+            }
             let index = match all.or_else(|| renamed.get(name.as_str()).copied()) {
                 Some(index) => index,
                 None if self.own.contains_key(&name) => self.named(&name)?,
-                None => self.push(name, material)?,
+                None => self.push(name, material, maps)?,
             };
             map.push(index);
         }
@@ -214,17 +226,17 @@ impl Builder<'_> {
             return Ok(index);
         }
         let material = self.own.get(name).copied().unwrap_or(mtl::DEFAULT);
-        let index = self.push(name.to_owned(), material)?;
+        let index = self.push(name.to_owned(), material, Maps::EMPTY)?;
         self.indices.insert(name.to_owned(), index);
         Ok(index)
     }
 
-    fn push(&mut self, name: String, material: Material) -> Result<u16, ImportError> {
+    fn push(&mut self, name: String, material: Material, maps: Maps) -> Result<u16, ImportError> {
         let index = u16::try_from(self.model.materials.len()).unwrap_or(u16::MAX);
         if index == u16::MAX {
             return Err(ImportError::new(self.source.file, "more than 65,535 materials", "use fewer materials"));
         }
-        self.model.materials.push(NamedMaterial { name, material });
+        self.model.materials.push(NamedMaterial { name, material, maps });
         Ok(index)
     }
 

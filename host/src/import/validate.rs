@@ -55,6 +55,15 @@ pub fn validate(model: &Model) -> Result<(), ImportError> {
             let problem = "a coordinate is not finite or beyond 2^100".to_owned();
             return Err(fail(part(), (problem, "scale the model down".to_owned())));
         }
+        let attributes = [("texture coordinates", mesh.coordinates.len()), ("colours", mesh.colours.len())];
+        if let Some((what, count)) = attributes.into_iter().find(|(_, n)| *n != 0 && *n != mesh.positions.len()) {
+            let problem = format!("{count} {what} for {} vertices", mesh.positions.len());
+            return Err(fail(part(), (problem, "give each vertex one, or none any".to_owned())));
+        }
+        if !mesh.coordinates.iter().flatten().all(|c| in_range(&[*c])) {
+            let problem = "a texture coordinate is not finite or beyond 2^100".to_owned();
+            return Err(fail(part(), (problem, "map the texture again".to_owned())));
+        }
         if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {
             let problem = format!("{} normals for {} vertices", mesh.normals.len(), mesh.positions.len());
             return Err(fail(part(), (problem, "give each vertex one, or none any".to_owned())));
@@ -237,7 +246,7 @@ mod tests {
             positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             normals: vec![[0.0, 0.0, 1.0]; 3],
             triangles: vec![[0, 1, 2]],
-            material: 0,
+            ..Mesh::default()
         });
         model.spheres.push(Sphere { centre: [0.0; 3], radius: 1.0, material: 0 });
         let (base, apex) = ([0.0; 3], [0.0, 0.0, 1.0]);

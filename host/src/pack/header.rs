@@ -5,12 +5,12 @@ use crate::import::PRIMITIVES_MAX;
 use crate::partition::VOXELS_MAX;
 use bytemuck::{Pod, Zeroable};
 use hybray_scene::{Node, PAGE_BYTES_MAX, PageEntry, lines_for};
-use hybray_shading::{Light, Material};
+use hybray_shading::{Light, Map, Maps, Material, Texture};
 
 /// Bytes that start a file: name, an end of line and an end of text that transfers as text would spoil.
 pub(super) const MAGIC: [u8; 8] = *b"hybray\r\x1a";
 /// Version of the format, the pages' included.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 /// Most bytes of the postcard tables.
 pub(super) const REST_MAX: u64 = 1 << 20;
 /// Most lights.
@@ -44,8 +44,13 @@ pub(super) struct FileHeader {
     pub voxels: u32,
     /// File units times 2 to this power are internal units.
     pub scale_log2: i32,
+    /// What materials take from textures: 0, or as many as materials.
+    pub maps: u32,
+    /// Uses of textures.
+    pub uses: u32,
+    pub textures: u32,
     /// Zero.
-    pub reserved: [u32; 6],
+    pub reserved: [u32; 3],
 }
 
 const _: () = assert!(size_of::<FileHeader>() == 128);
@@ -59,6 +64,9 @@ pub(super) struct Layout {
     pub voxels: u64,
     pub materials: u64,
     pub lights: u64,
+    pub maps: u64,
+    pub uses: u64,
+    pub textures: u64,
     pub rest: u64,
     /// Bytes of the file.
     pub end: u64,
@@ -72,7 +80,10 @@ impl Layout {
             (self.entries, u64::from(header.pages) * size_of::<PageEntry>() as u64, self.voxels),
             (self.voxels, u64::from(header.pages) * 4, self.materials),
             (self.materials, u64::from(header.materials) * size_of::<Material>() as u64, self.lights),
-            (self.lights, u64::from(header.lights) * size_of::<Light>() as u64, self.rest),
+            (self.lights, u64::from(header.lights) * size_of::<Light>() as u64, self.maps),
+            (self.maps, u64::from(header.maps) * size_of::<Maps>() as u64, self.uses),
+            (self.uses, u64::from(header.uses) * size_of::<Map>() as u64, self.textures),
+            (self.textures, u64::from(header.textures) * size_of::<Texture>() as u64, self.rest),
             (self.rest, header.rest_bytes, self.end),
         ];
         sections.into_iter().map(|(start, bytes, next)| (start + bytes, (next - start - bytes) as usize))
@@ -95,6 +106,9 @@ impl FileHeader {
             voxels: next(u64::from(self.pages) * 4),
             materials: next(u64::from(self.materials) * size_of::<Material>() as u64),
             lights: next(u64::from(self.lights) * size_of::<Light>() as u64),
+            maps: next(u64::from(self.maps) * size_of::<Maps>() as u64),
+            uses: next(u64::from(self.uses) * size_of::<Map>() as u64),
+            textures: next(u64::from(self.textures) * size_of::<Texture>() as u64),
             rest: next(self.rest_bytes),
             end: next(0),
         }
@@ -127,6 +141,11 @@ impl FileHeader {
         within("nodes of the directory", self.nodes.into(), self.pages.into())?;
         within("materials", self.materials.into(), u16::MAX.into())?;
         within("lights", self.lights.into(), LIGHTS_MAX.into())?;
+        within("uses of textures", self.uses.into(), u16::MAX.into())?;
+        within("textures", self.textures.into(), self.pages.into())?;
+        if self.maps != 0 && self.maps != self.materials {
+            return Err("what materials take from textures is neither nothing nor told of each".to_owned());
+        }
         within("voxels", self.voxels.into(), VOXELS_MAX.into())?;
         within("bytes of tables", self.rest_bytes, REST_MAX)?;
         for count in self.primitives {
@@ -136,7 +155,7 @@ impl FileHeader {
         if !(-126..=126).contains(&self.scale_log2) {
             return Err(format!("a scale of 2^{}", self.scale_log2));
         }
-        if self.reserved != [0; 6] || self.pages == 0 || self.voxels == 0 {
+        if self.reserved != [0; 3] || self.pages == 0 || self.voxels == 0 {
             return Err("its header makes no sense".to_owned());
         }
         if self.layout().end != self.file_bytes {

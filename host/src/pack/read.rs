@@ -5,12 +5,12 @@
 
 use super::header::FileHeader;
 use super::tables::Rest;
-use crate::build::{Index, Packed, hash_bytes, hash_page, primitives_in};
+use crate::build::{Index, Packed, geometry_pages, hash_bytes, hash_page, primitives_in};
 use crate::import;
 use crate::model::{Model, NamedMaterial};
 use bytemuck::Pod;
-use hybray_scene::{Directory, Line, PAGE_BYTES_MAX, PageEntry, PageView, Tables, lines_for};
-use hybray_shading::{Light, Material};
+use hybray_scene::{Directory, Line, PAGE_BYTES_MAX, PageEntry, PageView, Tables, Texels, lines_for, texel_page_bytes};
+use hybray_shading::{Light, Map, MapTables, Maps, Material, Texture};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -85,22 +85,27 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     let layout = header.layout();
 
     let entries: Vec<PageEntry> = sections.read_checked(layout.entries, header.pages, |entry: &PageEntry| {
-        let fits = (1..=PAGE_BYTES_MAX as u32).contains(&entry.bytes) && entry.kind == 0 && entry.owner == 0;
+        let known = entry.kind == PageEntry::GEOMETRY || entry.kind == PageEntry::TEXELS;
+        let fits = (1..=PAGE_BYTES_MAX as u32).contains(&entry.bytes) && known && entry.owner == 0;
         if fits { Ok(()) } else { Err(broken("its table of pages has an entry that makes no sense")) }
     })?;
     let lines: u64 = entries.iter().map(|entry| lines_for(entry.bytes as usize) as u64).sum();
     if lines != header.page_lines {
         return Err(broken("its table of pages does not make their length"));
     }
-    let mut before = 0;
+    let (mut before, mut left) = (0, geometry_pages(&entries));
     let voxels: Vec<u32> = sections.read_checked(layout.voxels, header.pages, |&voxel: &u32| {
-        let follows = voxel >= before && voxel < header.voxels;
-        before = voxel;
+        // Those of texels are shared out among the voxels.
+        let follows = (voxel >= before || left == 0) && voxel < header.voxels;
+        (before, left) = (voxel, left.saturating_sub(1));
         if follows { Ok(()) } else { Err(broken("a page is in no voxel, or out of order")) }
     })?;
     let nodes = sections.read(layout.nodes, header.nodes as usize)?;
     let materials: Vec<Material> = sections.read(layout.materials, header.materials as usize)?;
     let lights: Vec<Light> = sections.read(layout.lights, header.lights as usize)?;
+    let maps: Vec<Maps> = sections.read(layout.maps, header.maps as usize)?;
+    let uses: Vec<Map> = sections.read(layout.uses, header.uses as usize)?;
+    let textures: Vec<Texture> = sections.read(layout.textures, header.textures as usize)?;
     let rest_bytes: Vec<u8> = sections.read(layout.rest, header.rest_bytes as usize)?;
     let scratch = &mut vec![0; nodes.len() + entries.len()];
     Directory::parse(&nodes, &entries, scratch).map_err(|e| broken(e.to_string()))?;
@@ -108,14 +113,41 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     let mut index =
         Index { nodes, entries, voxels, voxel_count: header.voxels, primitives: Vec::new(), hash: Index::HASH_START };
     let chunks = read_pages(&mut sections, layout.pages, &mut index, materials.len())?;
-    let tables: [&[u8]; 4] = [
+    let tables: [&[u8]; 7] = [
         bytemuck::cast_slice(&index.voxels),
         bytemuck::cast_slice(&materials),
         bytemuck::cast_slice(&lights),
+        bytemuck::cast_slice(&maps),
+        bytemuck::cast_slice(&uses),
+        bytemuck::cast_slice(&textures),
         &rest_bytes,
     ];
     if header.sealed(tables.into_iter().fold(index.hash(), hash_bytes)) != header {
         return Err(broken("its bytes are not those that were written (the hash differs)"));
+    }
+    let tables = MapTables { maps: &maps, uses: &uses, textures: &textures };
+    let geometry = geometry_pages(&index.entries);
+    let texels = index.entries.len() as u32 - geometry;
+    // Their pages follow one another, each as large as its texture says, until there are none left.
+    let mut next = geometry;
+    let mut fits = tables.are_sound(materials.len(), index.entries.len() as u32);
+    for texture in &textures {
+        fits = fits
+            && texture.first == next
+            && (0..texture.levels).all(|level| {
+                let [columns, rows] = texture.squares(level);
+                let [width, height] = texture.level_size(level);
+                let tile = u32::from(texture.tile);
+                (0..columns * rows).all(|square| {
+                    let (x, y) = (square % columns * tile, square / columns * tile);
+                    let bytes = texel_page_bytes((width - x).min(tile) as u16, (height - y).min(tile) as u16);
+                    next += 1;
+                    index.entries.get(next as usize - 1).is_some_and(|entry| entry.bytes as usize == bytes)
+                })
+            });
+    }
+    if !fits || next != geometry + texels {
+        return Err(broken("its textures do not fit its pages"));
     }
     for (start, bytes) in layout.paddings(&header) {
         if sections.read::<u8>(start, bytes)?.iter().any(|&byte| byte != 0) {
@@ -130,7 +162,12 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     }
     let extent = rest.extent;
     let model = Model {
-        materials: materials.into_iter().map(|material| NamedMaterial { material, ..Default::default() }).collect(),
+        materials: materials
+            .into_iter()
+            .zip(maps.into_iter().chain(std::iter::repeat(Maps::EMPTY)))
+            .map(|(material, maps)| NamedMaterial { material, maps, ..Default::default() })
+            .collect(),
+        uses,
         lights,
         ..rest.into_model()
     };
@@ -138,7 +175,7 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     if model.cameras.is_empty() {
         return Err(broken("it has no camera"));
     }
-    let packed = Packed::new(index, chunks, header.scale_log2, model.materials.len());
+    let packed = Packed::new(index, chunks, header.scale_log2, model.materials.len(), textures);
     Ok(Packing { packed, model, primitives: header.primitives, smooth: header.smooth, extent })
 }
 
@@ -168,11 +205,17 @@ fn read_pages(
             let bytes = index.entries[page].bytes;
             let own = &piece[line..][..lines_for(bytes as usize)];
             line += own.len();
-            let view = PageView::parse(own, tables).map_err(|e| broken(format!("page {page}: {e}")))?;
-            if view.header.bytes != bytes {
+            let refused = |e| broken(format!("page {page}: {e}"));
+            let (length, primitives) = if index.entries[page].kind == PageEntry::TEXELS {
+                (Texels::parse(bytemuck::cast_slice(own)).map_err(refused)?.bytes(), 0)
+            } else {
+                let view = PageView::parse(own, tables).map_err(refused)?;
+                (view.header.bytes as usize, primitives_in(&view))
+            };
+            if length != bytes as usize {
                 return Err(broken(format!("page {page} is not as long as the table says")));
             }
-            index.add_page(primitives_in(&view), hash_page(own));
+            index.add_page(primitives, hash_page(own));
         }
         at += 64 * lines as u64;
         first = end;

@@ -8,7 +8,7 @@ use crate::partition::Voxels;
 use crate::picture::pending::Pending;
 use bytemuck::Zeroable;
 use hybray_scene::Line;
-use hybray_shading::{Light, Material};
+use hybray_shading::{Light, Material, Texture};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -52,6 +52,12 @@ pub fn pack(
         page_lines += lines.len() as u64;
         file.write_all(bytemuck::cast_slice(lines)).map_err(BuildError::Write)
     })?;
+    let (mut index, survey) = (index, survey);
+    let (textures, pages) = index.add_textures(&about.textures, settings.page_bytes);
+    for lines in &pages {
+        page_lines += lines.len() as u64;
+        file.write_all(bytemuck::cast_slice(lines)).map_err(BuildError::Write)?;
+    }
     let header = FileHeader {
         page_lines,
         primitives: survey.primitives,
@@ -60,7 +66,7 @@ pub fn pack(
         ..FileHeader::zeroed()
     };
     let extent = [survey.bounds.lo, survey.bounds.hi].map(|corner| corner.to_array());
-    let header = finish(file, header, &index, about, extent).map_err(BuildError::Write)?;
+    let header = finish(file, header, &index, about, &textures, extent).map_err(BuildError::Write)?;
     pending.commit().map_err(BuildError::Write)?;
     Ok(Written {
         file_bytes: header.file_bytes,
@@ -77,10 +83,12 @@ fn finish(
     header: FileHeader,
     index: &Index,
     about: &Model,
+    textures: &[Texture],
     extent: [[f32; 3]; 2],
 ) -> io::Result<FileHeader> {
     let materials: Vec<Material> = about.materials.iter().map(|m| m.material).collect();
     let lights: &[Light] = &about.lights;
+    let maps = about.maps();
     let rest = postcard::to_allocvec(&Rest::of(about, extent)).map_err(io::Error::other)?;
     let count = |n: usize| u32::try_from(n).map_err(io::Error::other);
     let mut header = FileHeader {
@@ -92,12 +100,22 @@ fn finish(
         nodes: count(index.nodes.len())?,
         materials: count(materials.len())?,
         lights: count(lights.len())?,
+        maps: count(maps.len())?,
+        uses: count(about.uses.len())?,
+        textures: count(textures.len())?,
         voxels: index.voxel_count,
         ..header
     };
     header.file_bytes = header.layout().end;
-    let tables: [&[u8]; 4] =
-        [bytemuck::cast_slice(&index.voxels), bytemuck::cast_slice(&materials), bytemuck::cast_slice(lights), &rest];
+    let tables: [&[u8]; 7] = [
+        bytemuck::cast_slice(&index.voxels),
+        bytemuck::cast_slice(&materials),
+        bytemuck::cast_slice(lights),
+        bytemuck::cast_slice(&maps),
+        bytemuck::cast_slice(&about.uses),
+        bytemuck::cast_slice(textures),
+        &rest,
+    ];
     let sections = [bytemuck::cast_slice(&index.nodes), bytemuck::cast_slice(&index.entries)];
     for section in sections.into_iter().chain(tables) {
         file.write_all(section)?;

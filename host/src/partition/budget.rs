@@ -33,7 +33,7 @@ fn dispatchers_share(nodes: u16) -> f64 {
 /// needs for a scene without pages, materials and lights: what those take is known only when the pages are made.
 #[must_use]
 pub fn page_bytes_for(memory: u64, nodes: u16) -> u32 {
-    let nothing = Sizes { pages: 0, pages_bytes: 0, page_bytes_max: 0, directory_nodes: 0, materials: 0, lights: 0 };
+    let nothing = Sizes::default();
     let taken =
         Plan::new(nothing, nodes, memory, None, Policy::default()).map_or(memory, |plan| plan.sum().total_bytes());
     let room = memory.saturating_sub(taken);
@@ -227,8 +227,7 @@ mod tests {
                     pages_bytes: 1000 * u64::from(bytes),
                     page_bytes_max: bytes as usize,
                     directory_nodes: 0,
-                    materials: 0,
-                    lights: 0,
+                    ..Sizes::default()
                 };
                 let policy = Policy::DemandDriven;
                 let wanted = |bytes| Wanted {
@@ -274,6 +273,8 @@ mod tests {
                 directory_nodes: pages.len() / 3,
                 materials: random.below(20) as usize,
                 lights: random.below(20) as usize,
+                maps: [random.below(20) as usize; 3],
+                texel_pages_of_a_hit: 2 * random.below(4) as usize,
             };
             let nodes = 1 + random.below(if seed % 2 == 0 { 24 } else { 2 }) as u16;
             let (_, policy) = Policy::ALL[random.below(4) as usize];

@@ -99,7 +99,7 @@ pub fn trace(scene: &Scene<'_>, scene_hash: u64, frame: &Frame, farm: &Farm, wat
     run(frame, scene_hash, farm, None, None, watch, &|peer, link, dispatcher, clock| {
         let mut memory = room(bytes);
         let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
-        let (store, at) = (All(scene.resident.pages), dispatcher_at(farm));
+        let (store, at) = (All(scene.resident.pages, scene.texels), dispatcher_at(farm));
         let settings = Settings { shadow_bundles: farm.shadow_bundles, ..Settings::default() };
         let node = Node::new(*scene, store, scene_hash, farm.kernels, peer, at, settings, memory);
         turn(node, link, dispatcher, clock)

@@ -33,10 +33,12 @@ fn sky() -> Scene<'static> {
             weight_cutoff: 0.0,
             distance_scale: 1.0,
             shadow_rays: 0,
+            maps: hybray_shading::MapTables::default(),
         },
         background: [0.25, 0.5, 1.0],
         magnitude: 1.0,
         transmits: false,
+        texels: &[],
     }
 }
 

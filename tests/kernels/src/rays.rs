@@ -3,7 +3,7 @@
 use hybray::prepare::Prepared;
 use hybray_bintree::walk::{Counts, Stack, nearest};
 use hybray_geometry::{Candidate, Ray, Vec3};
-use hybray_shading::{Child, Light, LightKind, Scene as Shading, Surface, offset_origin, spawn};
+use hybray_shading::{Child, Light, LightKind, Look, Scene as Shading, Surface, offset_origin, spawn};
 use hybray_tests::Random;
 use hybray_tracer::{Scene, surface};
 use hybray_wire::RayRecord;
@@ -27,7 +27,7 @@ pub fn sets(prepared: &Prepared, scene: &Scene<'_>, primary: Vec<Ray>) -> Vec<(K
         let page = hit.candidate.is_hit().then(|| scene.resident.pages[hit.page as usize]);
         let Some(place) = page.and_then(|page| surface(&page, &record(ray), &hit)) else { continue };
         if let Child::Shadow { origin, direction, t_max, .. } =
-            spawn::child(&shading, &spawn::Facing::new(&place), [1.0; 3], 1, 0, 0)
+            spawn::child(&shading, &spawn::Facing::new(&place, Look::PLAIN), [1.0; 3], 1, 0, 0)
         {
             shadow.push(Ray { origin, direction, t_min: 0.0, t_max });
         }

@@ -126,10 +126,12 @@ impl Toy {
                 weight_cutoff: 0.01,
                 distance_scale: 1.0,
                 shadow_rays: spawn::shadow_rays(&self.lights),
+                maps: hybray_shading::MapTables::default(),
             },
             background: [0.02, 0.03, 0.06],
             magnitude: 100.0,
             transmits: true,
+            texels: &[],
         }
     }
 

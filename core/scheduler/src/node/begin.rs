@@ -57,8 +57,11 @@ pub(super) fn trace_bundle<P: Pages + ?Sized>(
     wide::nearest(kernels, &scene.resident, rays, walked, scratch, walker.stack, &mut walker.counts);
 }
 
+/// `textured` says whether it tells how much it stands for: a pixel's part of its samples, so that the samples together see what
+/// the pixel does.
 pub(super) fn primary(
-    frame: &hybray_wire::Frame,
+    picture: &Picture,
+    textured: bool,
     ray: &Ray,
     place: &Place,
     best: &Hit,
@@ -66,11 +69,20 @@ pub(super) fn primary(
     (tile, epoch): (u32, u16),
     home: Peer,
 ) -> RayRecord {
+    let Picture { frame, camera, .. } = picture;
+    let t_end = if textured {
+        let [width, spread] = camera.footprint(ray.direction);
+        let share = 1.0 / libm::sqrtf(f32::from(frame.samples));
+        RayRecord::packed_footprint([width * share, spread * share])
+    } else {
+        0.0
+    };
     RayRecord {
         origin: ray.origin.to_array(),
         direction: ray.direction.to_array(),
         t_min: ray.t_min,
         t_max: best.candidate.t,
+        t_end,
         id: id::primary_id(frame.seed, place.y * frame.width + place.x, u32::from(sample)),
         primitive: best.candidate.id,
         hit_page: best.page,

@@ -9,6 +9,7 @@ use crate::rules;
 use hybray_arena::List;
 use hybray_bintree::walk::FROM_ROOT;
 use hybray_link::{HOST, Peer};
+use hybray_scene::PageEntry;
 use hybray_wire::RayRecord;
 
 impl<P: Store> Node<'_, '_, P> {
@@ -36,7 +37,8 @@ impl<P: Store> Node<'_, '_, P> {
                     continue;
                 }
                 let tile = self.in_work.tiles[usize::from(places[at].tile)];
-                let ray = primary(&picture.frame, &rays[at], &places[at], &best, sample, tile, self.me);
+                let ray =
+                    primary(picture, self.scene.has_textures(), &rays[at], &places[at], &best, sample, tile, self.me);
                 if self.memory.pool.push_to(outbox, RayRecord { settled: 1, page: best.page, ..ray }).is_err() {
                     break;
                 }
@@ -132,14 +134,18 @@ impl<P: Store> Node<'_, '_, P> {
             ray_ns: self.settings.ray_ns,
             link: self.settings.link,
         };
-        // Rays that were given to this node, or came back to it, go nowhere before their page has come.
-        let choice = if moved { Choice::Fetch } else { decide(self.settings.policy, &situation) };
+        // Rays that were given to this node, or came back to it, go nowhere before their page has come. Texels come where the hit is,
+        // which needs the page that it is in beside them.
+        let texels = entry.kind == PageEntry::TEXELS;
+        let choice = if moved || texels { Choice::Fetch } else { decide(self.settings.policy, &situation) };
         if choice == Choice::Fetch && has_room && self.request(page, false) {
             return true;
         }
         // No place for the page: if its owner had no room either, it is asked once more.
         let goes = choice == Choice::Forward
-            || (self.settings.grid.is_none() && rules::goes_again(moved, owner.full, situation.owner_traces));
+            || (self.settings.grid.is_none()
+                && !texels
+                && rules::goes_again(moved, owner.full, situation.owner_traces));
         if goes && self.settings.grid.is_some() {
             self.disperse(page, entry.owner, now);
         } else if goes {
@@ -178,7 +184,7 @@ impl<P: Store> Node<'_, '_, P> {
     /// were free this moment, so there is room.
     pub(super) fn wait_again(&mut self, mut list: List, moved: bool) {
         while let Some(ray) = self.memory.pool.pop(&mut list) {
-            let here = self.store.nearest(ray.page).is_some();
+            let here = self.store.is_at_hand(ray.page);
             let _ = self.memory.pool.push(RayRecord { moved: ray.moved | u8::from(moved), ..ray }, here);
         }
     }

@@ -8,6 +8,7 @@ use bytemuck::{bytes_of, pod_read_unaligned};
 use hybray_arena::List;
 use hybray_geometry::Candidate;
 use hybray_link::{HOST, Link, Peer};
+use hybray_scene::PageEntry;
 use hybray_wire::{
     BODY_BYTES_MAX, HEAD_BYTES_MAX, Message, Partial, RayKind, RayRecord, ShadowRecord, TileMap, View, encode,
 };
@@ -77,7 +78,7 @@ impl<P: Store> Node<'_, '_, P> {
             let shared = ray.moved == 1
                 || (ray.settled == 1 && ray.kind == RayKind::Primary as u8 && ray.primitive != Candidate::NOTHING);
             self.helped |= rules::was_helped(true, shared);
-            let here = self.store.nearest(ray.page).is_some();
+            let here = self.store.is_at_hand(ray.page);
             // There is room for all of them.
             let _ = self.memory.pool.push(ray, here);
         }
@@ -85,10 +86,12 @@ impl<P: Store> Node<'_, '_, P> {
 
     /// Whether a ray from elsewhere can be traced without harm.
     fn makes_sense(&self, ray: &RayRecord) -> bool {
-        let pages = self.scene.resident.directory.entries.len();
+        let entries = self.scene.resident.directory.entries;
+        let has_nodes = |page: u32| entries.get(page as usize).is_some_and(|entry| entry.kind == PageEntry::GEOMETRY);
         let map: Option<&TileMap> = self.picture.as_ref().map(|p| &p.map);
-        (ray.page as usize) < pages
-            && (ray.primitive == Candidate::NOTHING || (ray.hit_page as usize) < pages)
+        (ray.page as usize) < entries.len()
+            && (ray.settled == 1 || has_nodes(ray.page))
+            && (ray.primitive == Candidate::NOTHING || has_nodes(ray.hit_page))
             && ray.settled <= 1
             && ray.moved <= 1
             && ray.kind <= RayKind::Shadow as u8

@@ -473,6 +473,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             _ if pool.capacity() == 0 => 0,
             _ => 2 * TILES as u32,
         };
+        let textured = scene.has_textures();
         let mut units = 0;
         let mut bundles = 0;
         while u64::from(units) + walker.ahead < u64::from(self.settings.steps) {
@@ -505,7 +506,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     && let Some(ray) = lane.take(&scene, &mut walker, ray, &mut sums, &mut counts)
                 {
                     let here = at_hand(&scene, ray.page);
-                    self.aside = pool.push(ray, here).err();
+                    let lanes = rules::goes_to_the_lane(ray.tries, scene.shading.maps.pages_of_a_hit());
+                    self.aside = if lanes { Some(ray) } else { pool.push(ray, here).err() };
                 }
                 continue;
             }
@@ -535,7 +537,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                 Stage::Shading { sample, next, end } if next < end => {
                     let (place, went) = (&places[next], &walked[next]);
                     let tile = self.in_work.tiles[usize::from(place.tile)];
-                    let ray = primary(frame, &rays[next], place, &went.best, sample, tile, self.me);
+                    let ray = primary(picture, textured, &rays[next], place, &went.best, sample, tile, self.me);
                     // What it needs may have come since the bundle was traced, and what it hit may have gone.
                     let hit = went.best.candidate.is_hit() && !at_hand(&scene, went.best.page);
                     let waits = match went.needs {
@@ -550,14 +552,20 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     match waits {
                         Some(ray) if way.as_ref().is_some_and(|way| way.begin(&ray, pool, peers, now)) => {}
                         Some(ray) => self.aside = pool.push(ray, at_hand(&scene, ray.page)).err(),
-                        None => match hybray_tracer::begin(&scene, &ray, &went.best, &mut sums, &mut counts) {
-                            Some(record) if lit.is_empty() => lane.push(record),
-                            Some(record) => {
-                                lit[self.lit.count] = record;
-                                self.lit.count += 1;
+                        None => {
+                            let walks = &mut walker.counts;
+                            match hybray_tracer::begin(&scene, &ray, &went.best, &mut sums, &mut counts, walks) {
+                                Ok(Some(record)) if lit.is_empty() => lane.push(record),
+                                Ok(Some(record)) => {
+                                    lit[self.lit.count] = record;
+                                    self.lit.count += 1;
+                                }
+                                Ok(None) => {}
+                                // It passed what it hit, or wants texels.
+                                Err(on) if at_hand(&scene, on.page) => self.aside = Some(on),
+                                Err(on) => self.aside = pool.push(on, false).err(),
                             }
-                            None => {}
-                        },
+                        }
                     }
                     self.stage = Stage::Shading { sample, next: next + 1, end };
                 }
@@ -742,5 +750,5 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
 
 /// Whether a ray that needs `page` can go on here.
 fn at_hand<P: Pages + ?Sized>(scene: &Scene<'_, P>, page: u32) -> bool {
-    page == FROM_ROOT || scene.resident.pages.nearest(page).is_some()
+    page == FROM_ROOT || scene.resident.pages.nearest(page).is_some() || scene.resident.pages.texels(page).is_some()
 }

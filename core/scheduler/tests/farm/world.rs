@@ -327,7 +327,7 @@ pub fn play(plan: &Plan<'_>, lie: &mut dyn FnMut(Peer, Peer, &Message) -> Lie) -
         .map(|(me, memory)| {
             let hash = SCENE_HASH + u64::from(plan.stranger == Some(me));
             let memory = NodeMemory::carve(&mut Arena::new(memory), &limits).expect("the sum of its terms");
-            let store = All(plan.scene.resident.pages);
+            let store = All(plan.scene.resident.pages, &[]);
             // A step traces a sample of a bundle to its end, so that the world knows what it costs.
             let settings = Settings { steps: u32::MAX, ..Settings::default() };
             let kernels = Kernels::Portable;

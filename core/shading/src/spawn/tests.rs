@@ -6,7 +6,7 @@ const WHITE: [f32; 3] = [1.0; 3];
 
 /// A flat surface at the origin, seen from straight above.
 fn child(scene: &Scene<'_>, surface: &Surface, weight: [f32; 3], depth: u32, id: u64, cursor: u32) -> Child {
-    super::child(scene, &Facing::new(surface), weight, depth, id, cursor)
+    super::child(scene, &Facing::new(surface, Look::PLAIN), weight, depth, id, cursor)
 }
 
 fn floor() -> Surface {
@@ -45,6 +45,7 @@ fn scene<'a>(materials: &'a [Material], lights: &'a [Light]) -> Scene<'a> {
         weight_cutoff: 0.01,
         distance_scale: 1.0,
         shadow_rays: shadow_rays(lights),
+        maps: MapTables::default(),
     }
 }
 
@@ -87,8 +88,9 @@ fn emission_and_ambient_light() {
     let material = Material { emission: [3.0, 0.0, 1.0], ambient: [0.5, 1.0, 2.0], ..Material::MATT };
     let materials = [material];
     let scene = scene(&materials, &[]);
-    assert_eq!(local(&scene, &floor(), [1.0, 2.0, 4.0]), [3.25, 0.5, 5.0]);
-    assert_eq!(local(&scene, &Surface { material: 9, ..floor() }, WHITE), [0.0; 3]);
+    let shine = |surface: &Surface, weight| local(&scene, &Facing::new(surface, Look::PLAIN), WHITE, weight);
+    assert_eq!(shine(&floor(), [1.0, 2.0, 4.0]), [3.25, 0.5, 5.0]);
+    assert_eq!(shine(&Surface { material: 9, ..floor() }, WHITE), [0.0; 3]);
 }
 
 #[test]
@@ -370,13 +372,13 @@ fn depth_and_cutoff_end_the_tree() {
 fn shadow_rays_pass_through_glass() {
     let materials = [Material { transmission: [0.5, 0.25, 0.0], ..GLASS }, Material::MATT];
     let scene = scene(&materials, &[]);
-    let (origin, left) = pass_through(&scene, &floor(), [1.0, 2.0, 3.0]).unwrap();
+    let (origin, left) = pass_through(&scene, &floor(), 1.0, [1.0, 2.0, 3.0]).unwrap();
     assert_eq!(left, [0.5, 0.5, 0.0]);
     assert!(origin.z < -1e-6);
-    let (origin, _) = pass_through(&scene, &Surface { incoming: Vec3::Z, ..floor() }, WHITE).unwrap();
+    let (origin, _) = pass_through(&scene, &Surface { incoming: Vec3::Z, ..floor() }, 1.0, WHITE).unwrap();
     assert!(origin.z > 1e-6);
-    assert_eq!(pass_through(&scene, &Surface { material: 1, ..floor() }, WHITE), None);
-    assert_eq!(pass_through(&scene, &floor(), [0.0, 0.0, 1.0]), None);
+    assert_eq!(pass_through(&scene, &Surface { material: 1, ..floor() }, 1.0, WHITE), None);
+    assert_eq!(pass_through(&scene, &floor(), 1.0, [0.0, 0.0, 1.0]), None);
 }
 
 #[test]

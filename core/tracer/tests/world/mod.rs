@@ -105,10 +105,12 @@ impl World {
                 weight_cutoff: 1e-3,
                 distance_scale: 1.0,
                 shadow_rays: spawn::shadow_rays(&self.lights),
+                maps: hybray_shading::MapTables::default(),
             },
             background: [0.25, 0.5, 0.75],
             magnitude,
             transmits: self.shapes.iter().any(|&(_, m)| self.materials[usize::from(m)].transmits()),
+            texels: &[],
         })
     }
 }

@@ -90,8 +90,8 @@ pub fn vase() -> Model {
         name: "field".to_owned(),
         positions: corners.map(narrow).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        normals: Vec::new(),
         material: field,
+        ..Mesh::default()
     });
     let cylinders = model.cones.iter().filter(|c| c.base_radius == c.apex_radius).count() as u64;
     model.objects = Objects {

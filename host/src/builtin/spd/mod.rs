@@ -94,9 +94,9 @@ fn add_quad(model: &mut Model, name: &str, corners: [V; 4], material: Material) 
     model.meshes.push(Mesh {
         name: name.to_owned(),
         positions: corners.map(narrow).to_vec(),
-        normals: Vec::new(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material,
+        ..Mesh::default()
     });
     model.objects = Objects { polygons: model.objects.polygons + 1, ..model.objects };
 }

@@ -35,7 +35,7 @@ pub fn sombrero(size: u32) -> Model {
         }
     }
     model.objects.polygons = triangles.len() as u64;
-    model.meshes.push(Mesh { name: "sombrero".to_owned(), positions, normals: Vec::new(), triangles, material });
+    model.meshes.push(Mesh { name: "sombrero".to_owned(), positions, triangles, material, ..Mesh::default() });
     model
 }
 

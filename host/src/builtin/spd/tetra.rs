@@ -26,9 +26,9 @@ pub fn tetra(size: u32) -> Model {
     let mut mesh = Mesh {
         name: "tetra".to_owned(),
         positions: Vec::with_capacity(triangles),
-        normals: Vec::new(),
         triangles: Vec::with_capacity(triangles),
         material,
+        ..Mesh::default()
     };
     // At most three waiting siblings for each level.
     let mut waiting = vec![([0.0; 3], 1.0, size)];

@@ -2,6 +2,7 @@
 
 use super::super::testing::{Choices, Folder};
 use super::*;
+use hybray_shading::Material;
 use serde_json::{Value, json};
 
 /// A quad of two triangles in the plane z = 0, seen from +z; a fourth corner that only the sparse part has; bytes.
@@ -129,8 +130,8 @@ fn materials_cameras_and_lights() {
     let names: Vec<&str> = model.materials.iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["metal", "glass"]);
     let [metal, glass] = [0, 1].map(|i| model.materials[i].material);
-    assert_eq!((metal.mirror, metal.diffuse), ([1.0, 0.5, 0.25], [0.0; 3]));
-    assert_eq!((glass.transmission, glass.ior, glass.flags), ([1.0; 3], 1.33, Material::FRESNEL));
+    assert_eq!((metal.mirror, metal.diffuse), ([1.0; 3], [1.0, 0.5, 0.25]));
+    assert_eq!((glass.transmission, glass.ior, glass.flags), ([1.0; 3], 1.33, Material::PHYSICAL));
     let camera = &model.cameras[0];
     assert_eq!((camera.name.as_str(), camera.eye, camera.up), ("eye", [10.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
     assert_eq!(camera.target, [10.0, 0.0, -10.0]);
