@@ -148,6 +148,12 @@ fn meshes_without_end() {
 }
 
 #[test]
+fn textures() {
+    check("gallery:64", 4096, PageForm::Full, 2);
+    check("gallery:64", 8192, PageForm::Compact, 1);
+}
+
+#[test]
 fn many_lights() {
     check("paper:vase", 4096, PageForm::Full, 1);
     check("paper:vase", 16_384, PageForm::Full, 1);

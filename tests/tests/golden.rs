@@ -16,7 +16,7 @@ use hybray_tests::{Picture, kernels, scene};
 
 /// Film of each scene at 48 x 36 pixels, 2 samples each, all else as the scene has it.
 #[rustfmt::skip]
-const GOLDEN: [(&str, u64); 14] = [
+const GOLDEN: [(&str, u64); 15] = [
     ("spd:balls:3", 0x598587831af9062c),
     ("spd:balls-noground:2", 0x349e78c93249cc4b),
     ("spd:gears:2", 0x6fbe117293fe9e98),
@@ -31,6 +31,7 @@ const GOLDEN: [(&str, u64); 14] = [
     ("cornell:mirror", 0x2dc36ae38a0590e5),
     ("organic:3000", 0xa8734b777f7e6cce),
     ("terrain:8000", 0x0f44243739ae19fd),
+    ("gallery:64", 0x2098c058c5bed508),
 ];
 
 #[test]

@@ -95,6 +95,7 @@ same_picture! {
     cornell: "cornell" [80, 73] "box";
     cornell_mirror: "cornell:mirror" [73, 80] "tent";
     organic: "organic:2000" [96, 96] "gaussian";
+    gallery: "gallery:64" [80, 60] "tent";
     terrain: "terrain:5000" [96, 96] "box";
     conference: "paper:conference:9" [72, 72] "box";
 }

@@ -5,6 +5,7 @@
 //! order. Nothing here reads a file or a clock.
 
 mod cornell;
+mod gallery;
 mod noise;
 mod organic;
 mod paper;
@@ -172,7 +173,7 @@ const fn fixed(name: &'static str, about: &'static str, make: fn() -> Model) -> 
     BuiltinScene { name, about, size: None, make: Maker::Fixed(make) }
 }
 
-static SCENES: [BuiltinScene; 20] = [
+static SCENES: [BuiltinScene; 21] = [
     sized("spd:balls", "SPD: the sphereflake over a square", spd::balls, "levels of spheres", [1, 4, 7]),
     sized("spd:balls-noground", "SPD: the sphereflake alone", spd::balls_noground, "levels of spheres", [1, 4, 7]),
     sized("spd:gears", "SPD: meshed gears, some of them clear", spd::gears, "gears along each side", [1, 4, 32]),
@@ -186,6 +187,13 @@ static SCENES: [BuiltinScene; 20] = [
     sized("terrain", "fractal mountains", terrain::terrain, "triangles", [2, 1_000_000, PRIMITIVES_MAX]),
     fixed("cornell", "the Cornell box with its two blocks", cornell::blocks),
     fixed("cornell:mirror", "the Cornell box with a mirror and a glass sphere", cornell::spheres),
+    sized(
+        "gallery",
+        "Textures, cut-outs, rough metal and glass",
+        gallery::gallery,
+        "texels along each side of the floor",
+        [1, 256, 16_384],
+    ),
     sized("organic", "a closed knotted tube", organic::organic, "triangles", [200, 70_000, PRIMITIVES_MAX]),
     sized(
         "paper:balls",

@@ -290,17 +290,18 @@ mod tests {
 
     #[test]
     fn roughness_and_metalness_go_before_the_older_fields() {
+        let physical = Material { flags: Material::PHYSICAL, ambient: [0.0; 3], ior: 1.5, ..Material::MATT };
         let metal = one("Kd 1 0.5 0\nKs 1\nNs 500\nPr 0\nPm 1\nillum 2");
-        assert_eq!((metal.mirror, metal.diffuse), ([1.0, 0.5, 0.0], [0.0; 3]));
+        assert_eq!(metal, Material { diffuse: [1.0, 0.5, 0.0], mirror: [1.0; 3], ..physical });
         let matt = one("Kd 0.5\nKs 1\nNs 500\nPr 1\nillum 2");
-        assert_eq!(matt, Material { diffuse: [0.5; 3], ambient: [0.5; 3], ..Material::MATT });
-        // The exponent gives the roughness back.
+        assert_eq!(matt, Material { diffuse: [0.5; 3], exponent: 1.0, ..physical });
+        // The width of a highlight of that exponent: 2 over it and 2 more is the fourth power of the roughness.
         let shiny = one("Kd 0.5\nNs 30\nPm 0.25");
-        assert!((shiny.exponent - 30.0).abs() < 1e-3, "{}", shiny.exponent);
+        assert!((shiny.exponent - 0.5).abs() < 1e-6, "{}", shiny.exponent);
         let glass = one("Kd 1\nNi 1.3\nPr 0\nillum 7");
-        assert_eq!((glass.transmission, glass.ior, glass.flags), ([1.0; 3], 1.3, Material::FRESNEL));
+        assert_eq!(glass, Material { diffuse: [1.0; 3], transmission: [1.0; 3], ior: 1.3, ..physical });
         let half = one("Kd 1\nPr 1\nd 0.5");
-        assert_eq!((half.diffuse, half.transmission), ([0.5; 3], [0.5; 3]));
+        assert_eq!((half.diffuse, half.flags & Material::BLEND), ([1.0; 3], Material::BLEND));
         let error = parse("newmtl a\n\nPr 1.5").expect_err("too rough");
         assert_eq!(error, "m.mtl:3: Pr `1.5` is not allowed; give a number from 0 to 1");
     }
