@@ -21,6 +21,8 @@ use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use hybray_shading::{Light, LightKind};
 use materials::Placed;
+
+pub(super) use materials::picture_file;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::Path;

@@ -11,8 +11,8 @@ const VERTICES_MAX: usize = 1 << 31;
 #[derive(Default)]
 pub(crate) struct Meshes {
     meshes: Vec<Mesh>,
-    /// The mesh that takes more triangles, by material and whether it has normals.
-    open: BTreeMap<(u16, bool), usize>,
+    /// The mesh that takes more triangles, by material and whether it has normals and texture coordinates.
+    open: BTreeMap<(u16, bool, bool), usize>,
 }
 
 impl Meshes {
@@ -47,13 +47,14 @@ impl Meshes {
         if piece.triangles.is_empty() {
             return;
         }
-        let key = (piece.material, !piece.normals.is_empty());
+        let key = (piece.material, !piece.normals.is_empty(), !piece.coordinates.is_empty());
         if let Some(mesh) = self.open.get(&key).and_then(|&at| self.meshes.get_mut(at)) {
             let vertices = mesh.positions.len() + piece.positions.len();
             if mesh.triangles.len() + piece.triangles.len() <= triangles_max && vertices <= VERTICES_MAX {
                 let base = mesh.positions.len() as u32;
                 mesh.positions.append(&mut piece.positions);
                 mesh.normals.append(&mut piece.normals);
+                mesh.coordinates.append(&mut piece.coordinates);
                 mesh.triangles.extend(piece.triangles.iter().map(|t| t.map(|i| base + i)));
                 return;
             }
@@ -65,12 +66,12 @@ impl Meshes {
 
     fn open_mesh(&mut self, material: u16, normals: bool, vertices: usize, name: &str) -> &mut Mesh {
         let next = self.meshes.len();
-        let mut at = *self.open.get(&(material, normals)).unwrap_or(&next);
+        let mut at = *self.open.get(&(material, normals, false)).unwrap_or(&next);
         if self.meshes.get(at).is_some_and(|m| m.positions.len() + vertices > VERTICES_MAX) {
             at = next;
         }
         if at == next {
-            self.open.insert((material, normals), at);
+            self.open.insert((material, normals, false), at);
             self.meshes.push(Mesh { name: name.to_owned(), material, ..Mesh::default() });
         }
         &mut self.meshes[at]
@@ -86,6 +87,7 @@ impl Meshes {
 fn shrink(mesh: &mut Mesh) {
     mesh.positions.shrink_to_fit();
     mesh.normals.shrink_to_fit();
+    mesh.coordinates.shrink_to_fit();
     mesh.triangles.shrink_to_fit();
 }
 

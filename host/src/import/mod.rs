@@ -9,6 +9,7 @@ mod gltf;
 mod lines;
 mod meshes;
 mod mtl;
+mod mtl_maps;
 mod nff;
 mod obj;
 mod physical;

@@ -2,7 +2,7 @@
 //!
 //! `tobj` panics where a colour has fewer than three numbers and takes NaN for a number. So each statement is checked
 //! first, and what `tobj` gets to parse is the file with every number in range, `Kd 0.5` written out as
-//! `Kd 0.5 0.5 0.5`, and without what is not honoured (textures, sheen, coats), which is warned of.
+//! `Kd 0.5 0.5 0.5`, without pictures ([`super::mtl_maps`]), and without what is not honoured (sheen, coats), which is warned of.
 //!
 //! | `illum` | in Hybray |
 //! |---|---|
@@ -29,6 +29,7 @@
 use super::error::{ImportError, Warnings, quote};
 use super::guarded;
 use super::lines::{Lines, without_comment};
+use super::mtl_maps::Named;
 use super::physical::Physical;
 use hybray_shading::{Highlight, Maps, Material};
 use std::fmt::Write as _;
@@ -40,24 +41,28 @@ const FILE_BYTES_MAX: usize = 1 << 24;
 /// The grey of a surface that no material is said of.
 pub(crate) const DEFAULT: Material = Material { ambient: Material::MATT.diffuse, ..Material::MATT };
 
-/// A material, its name, and what it takes from textures.
-pub(crate) type Described = (String, (Material, Maps));
+/// A material, its name, and what it takes from textures: first without pictures, which stand beside it.
+pub(crate) type Described = (String, (Material, Maps), Vec<Named>);
 
 /// The materials of a file in its order, names as they stand there. A name that comes twice stands twice: the last
 /// one is meant.
 pub(crate) fn read(reader: impl BufRead, file: &str, warnings: &mut Warnings) -> Result<Vec<Described>, ImportError> {
-    let checked = check(Lines::new(reader, file, true), warnings)?;
+    let (checked, named) = check(Lines::new(reader, file, true), warnings)?;
     let parsed = guarded(|| tobj::load_mtl_buf(&mut checked.as_bytes()));
     match parsed {
-        Some(Ok((materials, _))) => Ok(materials.into_iter().map(|m| (m.name.clone(), material(&m))).collect()),
+        Some(Ok((materials, _))) => {
+            let named = named.into_iter().chain(std::iter::repeat(Vec::new()));
+            Ok(materials.into_iter().zip(named).map(|(m, named)| (m.name.clone(), material(&m), named)).collect())
+        }
         Some(Err(error)) => Err(ImportError::new(file, format!("not a material file ({error})"), "export it again")),
         None => Err(ImportError::new(file, "the MTL parser failed on this file", "export it again")),
     }
 }
 
-/// The statements that are honoured, one a line, with every number checked.
-fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<String, ImportError> {
+/// The statements that are honoured, one a line, with every number checked; and the pictures of each material.
+fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<(String, Vec<Vec<Named>>), ImportError> {
     let mut out = String::new();
+    let mut pictures: Vec<Vec<Named>> = Vec::new();
     let mut named = false;
     while let Some(line) = lines.next()? {
         let line = without_comment(line).trim().to_owned();
@@ -71,6 +76,7 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
                 return Err(lines.error("`newmtl` without a name", "give the material a name"));
             }
             named = true;
+            pictures.push(Vec::new());
             let _ = writeln!(out, "newmtl {rest}");
             continue;
         }
@@ -130,7 +136,11 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
                 let _ = writeln!(out, "illum {model}");
             }
             "sharpness" => {}
-            _ => honoured = false,
+            _ => match (Named::parse(key, rest), pictures.last_mut()) {
+                (Some(Ok(picture)), Some(pictures)) => pictures.push(picture),
+                (Some(Err(problem)), _) => warnings.add(number, &format!("{problem}: it is not used")),
+                _ => honoured = false,
+            },
         }
         if !honoured {
             let lower = key.to_ascii_lowercase();
@@ -144,7 +154,7 @@ fn check<R: BufRead>(mut lines: Lines<R>, warnings: &mut Warnings) -> Result<Str
             warnings.add(number, &format!("{}, {what}", quote(key)));
         }
     }
-    Ok(out)
+    Ok((out, pictures))
 }
 
 /// The numbers of `text`, at most four of them, each finite and `within`.
@@ -309,7 +319,7 @@ mod tests {
     #[test]
     fn names_and_order() {
         let (found, _) = parse("newmtl red one\nnewmtl b\r\nKd 1 0 0\nnewmtl b").expect("reads");
-        let names: Vec<&str> = found.iter().map(|(n, _)| n.as_str()).collect();
+        let names: Vec<&str> = found.iter().map(|(n, _, _)| n.as_str()).collect();
         assert_eq!(names, ["red one", "b", "b"]);
         assert_eq!(found[1].1.0.diffuse, [1.0, 0.0, 0.0]);
         assert_eq!(parse("").expect("reads").0, []);
@@ -317,15 +327,16 @@ mod tests {
 
     #[test]
     fn what_is_not_honoured_is_warned_of_once() {
-        let body = "Kd 1 1 1\nnewmtl a\nmap_Kd a.png\nmap_Kd\nPs 0.5\nbump x\nfoo 1\nd -halo 1\nKd spectral a.rfl\nNi 0\nillum 10";
+        let body = "Kd 1 1 1\nnewmtl a\nmap_Ka a.png\nmap_Kd\nPs 0.5\ndisp x\nfoo 1\nd -halo 1\nKd spectral a.rfl\nNi 0\nillum 10";
         let (_, warnings) = parse(body).expect("reads");
         assert_eq!(
             warnings,
             [
                 "m.mtl:1: what stands before the first `newmtl` is not used",
-                "m.mtl:3: `map_Kd`, a texture, is not used (2 times, here first)",
+                "m.mtl:3: `map_Ka`, a texture, is not used",
+                "m.mtl:4: `map_Kd`: no file is named: it is not used",
                 "m.mtl:5: `Ps`, of physically based shading, is not used",
-                "m.mtl:6: `bump`, a texture, is not used",
+                "m.mtl:6: `disp`, a texture, is not used",
                 "m.mtl:7: `foo`, is not known here and not used",
                 "m.mtl:8: `d -halo` is taken as `d`",
                 "m.mtl:9: Kd as `spectral` is not used",

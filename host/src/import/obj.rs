@@ -8,8 +8,8 @@
 //!
 //! The guard also keeps `tobj` small. `tobj` holds 104 bytes for each face of the object it is reading and a hash map
 //! of its vertices; so the guard lets no object grow beyond [`PIECE_FACES`] faces: it cuts the file into *pieces* of
-//! one material, with or without normals, and names each by its number. Texture coordinates and vertex colours do not
-//! pass: nothing uses them yet, and `tobj` would split vertices at their seams. Pieces become meshes one by one, and
+//! one material, with or without normals and texture coordinates, and names each by its number. Texture coordinates pass
+//! where the material has pictures: `tobj` splits vertices at their seams. Vertex colours do not pass. Pieces become meshes one by one, and
 //! small ones of one material are joined.
 //!
 //! What `tobj` can do to the process is bounded too: it runs under `catch_unwind`.
@@ -20,13 +20,15 @@
 use super::error::{ImportError, Warnings, quote};
 use super::lines::{Lines, without_comment};
 use super::meshes::Meshes;
+use super::mtl_maps::{self, Pictures};
 use super::polygon::{CORNERS_MAX, Polygons, has_area, unit};
 use super::{COORDINATE_MAX, Opened, guarded, mtl, open};
 use crate::model::{Mesh, Model, NamedMaterial};
-use hybray_shading::{Maps, Material};
+use hybray_shading::{Map, Maps, Material};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, Read, Write as _};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Faces after which `tobj` is told of a new object: 27 MB of its records, and few enough borders between pieces that
 /// the vertices they share, kept twice, do not count (about 1 in 250 in a mesh that is stored in strips).
@@ -50,7 +52,31 @@ pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
 }
 
 /// What a `mtllib` line brought.
-pub(super) type Library = Result<(Vec<mtl::Described>, Vec<String>), MaterialFile>;
+pub(super) type Library = Result<(Vec<(String, Known)>, Vec<String>), MaterialFile>;
+
+/// A material of a material file: it may have pictures.
+#[derive(Clone)]
+pub(super) struct Known {
+    material: Material,
+    maps: Maps,
+    pictures: Arc<Pictures>,
+}
+
+impl Known {
+    /// Without pictures.
+    fn plain(material: Material) -> Self {
+        Self { material, maps: Maps::EMPTY, pictures: Arc::default() }
+    }
+
+    /// Reads what stands in `folder`.
+    pub(super) fn all(folder: &Path, described: Vec<mtl::Described>, warnings: &mut Warnings) -> Vec<(String, Self)> {
+        let known = described.into_iter().map(|(name, (mut material, maps), named)| {
+            let pictures = Arc::new(mtl_maps::read(folder, &named, &mut material, warnings));
+            (name, Self { material, maps, pictures })
+        });
+        known.collect()
+    }
+}
 
 /// Why it brought nothing.
 pub(super) enum MaterialFile {
@@ -68,6 +94,7 @@ fn read_materials(folder: &Path, name: &str) -> Library {
             Ok(reader) => {
                 let mut warnings = Warnings::default();
                 let materials = mtl::read(reader, &file, &mut warnings).map_err(MaterialFile::Broken)?;
+                let materials = Known::all(path.parent().unwrap_or(Path::new("")), materials, &mut warnings);
                 return Ok((materials, warnings.lines(&file).collect()));
             }
             Err(Opened::Missing(_)) => {}
@@ -98,7 +125,7 @@ pub(super) fn read<R: BufRead>(reader: R, file: &str, library: impl Fn(&str) -> 
         return Err(ImportError::new(file, "holds no faces", "check that it is an OBJ file with `f` lines"));
     }
 
-    let mut model = Model { materials: guard.materials, warnings: guard.notes, ..Model::default() };
+    let mut model = Model { warnings: guard.notes, ..guard.model };
     model.objects.polygons = guard.faces;
     let (mut meshes, mut polygons, mut dropped) = (Meshes::default(), Polygons::new(), 0);
     for piece in pieces {
@@ -120,6 +147,7 @@ fn to_mesh(piece: tobj::Mesh, about: &Piece, polygons: &mut Polygons, dropped: &
     let (arities, indices) = (piece.face_arities, piece.indices);
     let positions = points(piece.positions);
     let normals = points(piece.normals);
+    let coordinates: Vec<[f32; 2]> = piece.texcoords.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
     let mut triangles = Vec::with_capacity(if arities.is_empty() { indices.len() / 3 } else { 0 });
     let mut corners: Vec<[f32; 3]> = Vec::new();
     let mut from = 0;
@@ -141,7 +169,9 @@ fn to_mesh(piece: tobj::Mesh, about: &Piece, polygons: &mut Polygons, dropped: &
         *dropped += u64::from(triangles.len() == before);
     }
     let normals = if normals.len() == positions.len() { units(normals, &positions, &triangles) } else { Vec::new() };
-    Mesh { name: about.name.clone(), positions, normals, triangles, material: about.material, ..Mesh::default() }
+    let coordinates = if coordinates.len() == positions.len() { coordinates } else { Vec::new() };
+    let (name, material) = (about.name.clone(), about.material);
+    Mesh { name, positions, normals, coordinates, triangles, material, ..Mesh::default() }
 }
 
 /// Normals at length 1; those without a length become the mean of the triangles around.
@@ -170,11 +200,12 @@ pub(super) fn units(mut normals: Vec<[f32; 3]>, positions: &[[f32; 3]], triangle
     normals
 }
 
-/// Faces that follow each other with one material, all with normals or all without.
+/// Faces that follow each other with one material, all with normals or all without, and with texture coordinates or without.
 struct Piece {
     name: String,
     material: u16,
     normals: bool,
+    coordinates: bool,
     faces: u32,
     corners: u32,
 }
@@ -200,11 +231,12 @@ struct Guard<'a, R> {
     /// Material that the file has chosen, and its index once a face has it.
     chosen: Option<String>,
     chosen_index: Option<u16>,
-    known: BTreeMap<String, (Material, Maps)>,
+    known: BTreeMap<String, Known>,
     /// What stood in the `mtllib` lines so far.
     loaded: BTreeSet<String>,
     indices: BTreeMap<String, u16>,
-    materials: Vec<NamedMaterial>,
+    /// Its materials, textures and their uses.
+    model: Model,
     corners: Vec<[i64; 3]>,
     warnings: Warnings,
     /// Warnings about material files.
@@ -232,7 +264,7 @@ impl<'a, R: BufRead> Guard<'a, R> {
             known: BTreeMap::new(),
             loaded: BTreeSet::new(),
             indices: BTreeMap::new(),
-            materials: Vec::new(),
+            model: Model::default(),
             corners: Vec::new(),
             warnings: Warnings::default(),
             notes: Vec::new(),
@@ -249,10 +281,15 @@ impl<'a, R: BufRead> Guard<'a, R> {
             let key_end = line.find(char::is_whitespace).unwrap_or(line.len());
             let (key, rest) = line.split_at(key_end);
             match key {
-                "v" | "vn" => {
+                "v" | "vn" | "vt" => {
                     let is_vertex = key == "v";
+                    let what = ["v", "vn", "vt"][usize::from(key == "vn") + 2 * usize::from(key == "vt")];
                     let written = write_numbers(&mut self.out, key, rest);
-                    let count = if is_vertex { &mut self.vertices } else { &mut self.normals };
+                    let count = match key {
+                        "v" => &mut self.vertices,
+                        "vn" => &mut self.normals,
+                        _ => &mut self.textures,
+                    };
                     *count += 1;
                     let (count, limit) = (*count, self.vertices_max);
                     match written {
@@ -263,11 +300,10 @@ impl<'a, R: BufRead> Guard<'a, R> {
                         Err((problem, remedy)) => return Err(self.lines.error(problem, remedy)),
                     }
                     if count > limit {
-                        let problem = format!("more than {limit} of `{}`", if is_vertex { "v" } else { "vn" });
+                        let problem = format!("more than {limit} of `{what}`");
                         return Err(self.lines.error(problem, "cut the model into several files"));
                     }
                 }
-                "vt" => self.textures += 1,
                 "f" => self.face()?,
                 "l" | "p" => self.warnings.add(self.lines.number(), "lines and points are not drawn"),
                 "o" | "g" => {
@@ -310,21 +346,28 @@ impl<'a, R: BufRead> Guard<'a, R> {
         if let Some(index) = self.chosen_index {
             return Ok(index);
         }
-        let known = self.chosen.as_ref().and_then(|name| Some((name.clone(), *self.known.get(name)?)));
+        let known = self.chosen.as_ref().and_then(|name| Some((name.clone(), self.known.get(name)?.clone())));
         if let (Some(name), None) = (&self.chosen, &known) {
             let text = format!("the material {} is not in any material file, the default is used", quote(name));
             self.warnings.add(self.lines.number(), &text);
         }
-        let (name, (material, maps)) = known.unwrap_or_else(|| ("default".to_owned(), (mtl::DEFAULT, Maps::EMPTY)));
+        let (name, known) = known.unwrap_or_else(|| ("default".to_owned(), Known::plain(mtl::DEFAULT)));
+        let Known { material, mut maps, pictures } = known;
+        for (which, picture) in pictures.iter().enumerate() {
+            if let Some((texture, map)) = picture {
+                let texture = self.model.add_texture(texture.clone());
+                maps.maps[which] = self.model.add_use(Map { texture, ..*map });
+            }
+        }
         let is_same = |m: &NamedMaterial| (m.material, m.maps) == (material, maps);
         let index = match self.indices.get(&name) {
-            Some(&index) if self.materials.get(usize::from(index)).is_some_and(is_same) => index,
+            Some(&index) if self.model.materials.get(usize::from(index)).is_some_and(is_same) => index,
             _ => {
-                let next = u16::try_from(self.materials.len()).unwrap_or(u16::MAX);
+                let next = u16::try_from(self.model.materials.len()).unwrap_or(u16::MAX);
                 if next == u16::MAX {
                     return Err(self.lines.error("more than 65,535 materials", "use fewer materials"));
                 }
-                self.materials.push(NamedMaterial { name: name.clone(), material, maps });
+                self.model.materials.push(NamedMaterial { name: name.clone(), material, maps });
                 self.indices.insert(name, next);
                 next
             }
@@ -399,12 +442,20 @@ impl<'a, R: BufRead> Guard<'a, R> {
         }
         let normals = with_normals == corners.len();
         let material = self.material()?;
+        // Who has no pictures needs no coordinates, and `tobj` would split vertices at their seams.
+        let pictured = self.model.materials.get(usize::from(material)).is_some_and(|m| m.maps.count() > 0);
+        let coordinates = pictured && corners.iter().all(|c| c[1] > 0);
+        if pictured && !coordinates {
+            self.warnings.add(self.lines.number(), "faces of a material with pictures have no texture coordinates");
+        }
         let fits = self.pieces.last().is_some_and(|p| {
-            p.material == material && p.normals == normals && p.faces < self.piece_faces && p.corners < 4 * PIECE_FACES
+            (p.material, p.normals, p.coordinates) == (material, normals, coordinates)
+                && p.faces < self.piece_faces
+                && p.corners < 4 * PIECE_FACES
         });
         if !fits {
             let _ = writeln!(self.out, "g {}", self.pieces.len());
-            self.pieces.push(Piece { name: self.name.clone(), material, normals, faces: 0, corners: 0 });
+            self.pieces.push(Piece { name: self.name.clone(), material, normals, coordinates, faces: 0, corners: 0 });
         }
         if let Some(piece) = self.pieces.last_mut() {
             piece.faces += 1;
@@ -412,8 +463,13 @@ impl<'a, R: BufRead> Guard<'a, R> {
         }
         self.faces += 1;
         self.out.push(b'f');
-        for &[v, _, n] in corners {
-            let _ = if normals { write!(self.out, " {v}//{n}") } else { write!(self.out, " {v}") };
+        for &[v, t, n] in corners {
+            let _ = match (coordinates, normals) {
+                (true, true) => write!(self.out, " {v}/{t}/{n}"),
+                (true, false) => write!(self.out, " {v}/{t}"),
+                (false, true) => write!(self.out, " {v}//{n}"),
+                (false, false) => write!(self.out, " {v}"),
+            };
         }
         self.out.push(b'\n');
         Ok(())
@@ -423,7 +479,7 @@ impl<'a, R: BufRead> Guard<'a, R> {
 /// What is wrong with a line, and what to do.
 type Complaint = (String, &'static str);
 
-/// Writes `v` or `vn` for `tobj`; true if there were colours, which are left out.
+/// Writes `v`, `vn` or `vt` for `tobj`; true if there were colours, which are left out.
 fn write_numbers(out: &mut Vec<u8>, key: &str, rest: &str) -> Result<bool, Complaint> {
     let mut words = [""; 7];
     let mut count = 0;
@@ -434,13 +490,25 @@ fn write_numbers(out: &mut Vec<u8>, key: &str, rest: &str) -> Result<bool, Compl
         words[count] = word;
         count += 1;
     }
-    let allowed = if key == "v" { matches!(count, 3 | 4 | 6) } else { count == 3 };
+    let allowed = match key {
+        "v" => matches!(count, 3 | 4 | 6),
+        "vt" => matches!(count, 1..=3),
+        _ => count == 3,
+    };
     if !allowed {
         let found = if count == words.len() { "too many".to_owned() } else { count.to_string() };
-        let remedy = if key == "v" { "give `v x y z`, `v x y z w` or `v x y z r g b`" } else { "give `vn x y z`" };
+        let remedy = match key {
+            "v" => "give `v x y z`, `v x y z w` or `v x y z r g b`",
+            "vt" => "give `vt u v`",
+            _ => "give `vn x y z`",
+        };
         return Err((format!("`{key}` with {found} numbers"), remedy));
     }
-    let kept = if count == 4 { 4 } else { 3 };
+    let kept = match key {
+        "vt" => count.min(2),
+        _ if count == 4 => 4,
+        _ => 3,
+    };
     let mut values = [0.0f32; 4];
     for (value, word) in values.iter_mut().zip(&words[..kept]) {
         *value = match word.parse::<f32>() {
@@ -459,6 +527,9 @@ fn write_numbers(out: &mut Vec<u8>, key: &str, rest: &str) -> Result<bool, Compl
     for word in &words[..kept] {
         out.push(b' ');
         out.extend_from_slice(word.as_bytes());
+    }
+    if key == "vt" && kept == 1 {
+        out.extend_from_slice(b" 0");
     }
     out.push(b'\n');
     Ok(count == 6)
@@ -536,6 +607,7 @@ mod tests {
             "a.mtl" | "b c.mtl" => {
                 let mut warnings = Warnings::default();
                 let found = mtl::read(MTL.as_bytes(), name, &mut warnings).map_err(MaterialFile::Broken)?;
+                let found = Known::all(Path::new(""), found, &mut warnings);
                 Ok((found, Vec::new()))
             }
             "bad.mtl" => Err(MaterialFile::Broken(ImportError::at("bad.mtl", 7, "broken", "mend it"))),

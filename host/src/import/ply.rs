@@ -2,7 +2,7 @@
 //!
 //! Elements are read one at a time into the mesh that becomes of them; a list that is longer than a polygon may be, or than the
 //! rest of the file, is an error before it is kept. Vertices (`x`, `y`, `z`, and `nx`, `ny`, `nz`), faces (`vertex_indices` or
-//! `vertex_index`) and triangle strips (`tristrips`, an index of -1 begins another) are used; other elements and properties
+//! `vertex_index`) and triangle strips (`tristrips`, an index of -1 begins another) are used, and so are colours of vertices; other elements and properties
 //! are read over.
 
 use super::error::{ImportError, quote};
@@ -11,6 +11,7 @@ use super::obj::units;
 use super::polygon::{CORNERS_MAX, Polygons, has_area};
 use super::{guarded, open};
 use crate::model::{Mesh, Model};
+use hybray_shading::Material;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
 use std::io::{BufRead, Read};
@@ -26,13 +27,15 @@ const HEADER_MAX: u64 = 1 << 20;
 struct Item {
     /// Position and normal of a vertex.
     values: [f32; 6],
+    /// Red, green, blue and coverage: sRGB as bytes, or as numbers from 0 to 1.
+    colour: Option<[u8; 4]>,
     /// Corners of a face or a strip; -1 where an index is none.
     list: Vec<i64>,
 }
 
 const VALUES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 const LISTS: [&str; 3] = ["vertex_indices", "vertex_index", "tristrips"];
-const COLOURS: [&str; 3] = ["red", "green", "blue"];
+const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
 
 impl PropertyAccess for Item {
     fn new() -> Self {
@@ -45,6 +48,18 @@ impl PropertyAccess for Item {
                 Some(value) => self.values[at] = value,
                 None => return PropertyAccessResult::Ignored,
             }
+            return PropertyAccessResult::Set;
+        }
+        if let Some(at) = COLOURS.iter().position(|known| *known == name) {
+            let value = match property {
+                Property::UChar(value) => value,
+                Property::UShort(value) => (value >> 8) as u8,
+                // A cast keeps within what the type holds.
+                Property::Float(value) => (value * 255.0 + 0.5) as u8,
+                Property::Double(value) => (value * 255.0 + 0.5) as u8,
+                _ => return PropertyAccessResult::Ignored,
+            };
+            self.colour.get_or_insert([u8::MAX; 4])[at] = value;
             return PropertyAccessResult::Set;
         }
         // The first list of these is the one that counts: a file has one of them.
@@ -92,7 +107,7 @@ pub(super) fn read<R: BufRead>(reader: R, file: &str) -> Result<Model, ImportErr
     source.reader.get_mut().set_limit(u64::MAX);
 
     let mut scene = Scene::default();
-    let mut model = Model::default();
+    let model = Model::default();
     let is_faces = |element: &ElementDef| matches!(&*element.name, "face" | "tristrips") && element.count > 0;
     if !header.elements.values().any(is_faces) {
         let remedy = "points alone are not drawn: export a mesh";
@@ -106,9 +121,7 @@ pub(super) fn read<R: BufRead>(reader: R, file: &str) -> Result<Model, ImportErr
             return Err(ImportError::new(file, problem, "export positions too"));
         }
         scene.has_normals |= is_vertex && has(&VALUES[3..]);
-        if is_vertex && has(&COLOURS) {
-            model.warnings.push(format!("{file}: colours of vertices are not used"));
-        }
+        scene.has_colours |= is_vertex && has(&COLOURS[..3]);
         let is_strip = element.name == "tristrips";
         // Of nothing there may be any number.
         if element.properties.is_empty() {
@@ -117,7 +130,7 @@ pub(super) fn read<R: BufRead>(reader: R, file: &str) -> Result<Model, ImportErr
         for number in 0..element.count {
             let item = source.next(header.encoding, element, number)?;
             match element.name.as_str() {
-                "vertex" => scene.vertex(item.values),
+                "vertex" => scene.vertex(item.values, item.colour),
                 "face" | "tristrips" => {
                     let added = if is_strip { scene.strip(&item.list) } else { scene.face(&item.list) };
                     added.map_err(|(problem, remedy)| source.error(element, number, problem, &remedy))?;
@@ -190,6 +203,7 @@ type Complaint = (String, String);
 struct Scene {
     mesh: Mesh,
     has_normals: bool,
+    has_colours: bool,
     corners: Vec<[f32; 3]>,
     polygons: Option<Polygons>,
     faces: u64,
@@ -197,10 +211,13 @@ struct Scene {
 }
 
 impl Scene {
-    fn vertex(&mut self, [x, y, z, nx, ny, nz]: [f32; 6]) {
+    fn vertex(&mut self, [x, y, z, nx, ny, nz]: [f32; 6], colour: Option<[u8; 4]>) {
         self.mesh.positions.push([x, y, z]);
         if self.has_normals {
             self.mesh.normals.push([nx, ny, nz]);
+        }
+        if self.has_colours {
+            self.mesh.colours.push(colour.unwrap_or([u8::MAX; 4]));
         }
     }
 
@@ -266,7 +283,14 @@ impl Scene {
         let mesh = &mut self.mesh;
         mesh.normals = units(std::mem::take(&mut mesh.normals), &mesh.positions, &mesh.triangles);
         mesh.name = "faces".to_owned();
-        mesh.material = model.add_material("default", mtl::DEFAULT);
+        let mut material = mtl::DEFAULT;
+        if !mesh.colours.is_empty() {
+            // Its vertices say how light it is.
+            (material.diffuse, material.ambient) = ([1.0; 3], [1.0; 3]);
+            let through = mesh.colours.iter().any(|colour| colour[3] < u8::MAX);
+            material.flags |= Material::DETAIL | if through { Material::BLEND } else { 0 };
+        }
+        mesh.material = model.add_material("default", material);
         model.objects.polygons = self.faces;
         model.meshes.push(self.mesh);
         model
@@ -350,7 +374,8 @@ mod tests {
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [2, 1, 3]]);
         // All look up: the normal that is none is the mean of those around.
         assert_eq!(mesh.normals[..4], [[0.0, 0.0, 1.0]; 4]);
-        assert_eq!(model.warnings, ["a.ply: colours of vertices are not used"]);
+        assert_eq!(mesh.colours, [[1, 2, 3, 255], [1, 2, 3, 255], [1, 2, 3, 255], [1, 2, 3, 255], [0, 0, 0, 255]]);
+        assert_eq!(model.materials[0].material.flags, Material::DETAIL);
     }
 
     #[test]

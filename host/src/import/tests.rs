@@ -175,6 +175,7 @@ fn broken_bytes_break_nothing() {
         let library = |_: &str| {
             let mut warnings = error::Warnings::default();
             let found = mtl::read(&bytes[..], name, &mut warnings).map_err(obj::MaterialFile::Broken)?;
+            let found = obj::Known::all(Path::new(""), found, &mut warnings);
             Ok((found, Vec::new()))
         };
         let result = match name {

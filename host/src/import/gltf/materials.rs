@@ -174,7 +174,7 @@ impl Reader<'_> {
 }
 
 /// The picture in a file.
-pub(in super::super) fn picture_file(path: &Path) -> Result<(Image, Format), String> {
+pub(in crate::import) fn picture_file(path: &Path) -> Result<(Image, Format), String> {
     let told = |what: String| format!("{}: {what}", path.display());
     let reader = open(path).map_err(|e| e.into_error(&path.display().to_string()).to_string())?;
     let mut bytes = Vec::new();
@@ -195,7 +195,7 @@ fn matrix(transform: Option<&TextureTransform<'_>>) -> [f32; 6] {
 }
 
 /// Texture coordinates as they are.
-pub(in super::super) const IDENTITY: [f32; 6] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+const IDENTITY: [f32; 6] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// The same from JSON, where the crate does not know it.
 fn transform_of(value: &serde_json::Value) -> Option<[f32; 6]> {
