@@ -103,7 +103,7 @@ pub fn turns(
         let now = turn * TURN_NS;
         post.receive(usize::from(HOST), &mut |from, bytes| match decode(bytes) {
             Ok(view) => {
-                dispatcher.handle(from, &view.message, now);
+                dispatcher.handle(from, &view, now);
                 if let Message::Fetch { page } = view.message {
                     server.fetch(from, page);
                 }

@@ -170,7 +170,7 @@ fn molest(random: &mut Random, nodes: u16, post: &mut Post) {
             return if bytes > 0 && room[0] != 4 { bytes } else { 0 };
         }
         let message = message(random, 7);
-        encode(&message, room, |body| match message {
+        encode(0, &message, room, |body| match message {
             Message::Rays { rays, .. } => {
                 let (nearest, any) = body.split_at_mut(usize::from(rays) * size_of::<RayRecord>());
                 for bytes in nearest.chunks_exact_mut(size_of::<RayRecord>()) {

@@ -102,6 +102,16 @@ impl<'m, T: Copy> Slab<'m, T> {
         Some(item)
     }
 
+    /// Takes all items out, whatever lists they are in: these are of no use any more, and must be given up for empty ones. It
+    /// takes time for each place that was ever used.
+    pub fn clear(&mut self) {
+        let links = self.next.iter_mut().zip(1..).take(self.touched as usize);
+        links.for_each(|(link, next)| *link = if next == self.touched { NONE } else { next });
+        if self.touched > 0 {
+            self.freed = List { head: 0, tail: self.touched - 1, len: self.touched };
+        }
+    }
+
     /// The last item of a list.
     pub fn back_mut(&mut self, list: &List) -> Option<&mut T> {
         if list.is_empty() { None } else { Some(&mut self.items[list.tail as usize]) }

@@ -65,6 +65,19 @@ impl core::ops::AddAssign for Counts {
     }
 }
 
+impl core::ops::Sub for Counts {
+    type Output = Self;
+
+    /// What was counted since `b`, an earlier count.
+    fn sub(self, b: Self) -> Self {
+        Self {
+            nodes: self.nodes.saturating_sub(b.nodes),
+            blocks: self.blocks.saturating_sub(b.blocks),
+            pages: self.pages.saturating_sub(b.pages),
+        }
+    }
+}
+
 /// Subtrees that wait in a walk at most: seven siblings on each level of the directory and of a page.
 pub const STACK: usize = 2 * DEPTH_MAX * (WIDTH - 1) + 2;
 

@@ -118,7 +118,7 @@ fn lead(
         let received = link.receive(&mut |event| match event {
             Event::Frame { from, bytes } => match decode(bytes) {
                 Ok(view) => {
-                    dispatcher.handle(from, &view.message, now);
+                    dispatcher.handle(from, &view, now);
                     master.handle(from, &view);
                 }
                 Err(_) => master.refuse(),

@@ -8,7 +8,7 @@ use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Link, Peer};
 use hybray_pyraclip::wide;
 use hybray_tracer::Scene;
-use hybray_wire::{CLIPLIST_MAX, HEAD_BYTES_MAX, Message, TileMap, encode};
+use hybray_wire::{CLIPLIST_MAX, HEAD_BYTES_MAX, Message, TileMap, View, encode};
 
 /// Pages that a bundle meets, the nearest first, as far as there is room.
 pub(crate) type Cliplist = heapless::Vec<u32, CLIPLIST_MAX>;
@@ -60,9 +60,20 @@ impl<'m> Clips<'m> {
         }
     }
 
+    /// Another picture comes: nobody wants what it has asked for.
+    pub fn clear(&mut self) {
+        self.wanted.iter_mut().for_each(|wanted| wanted.count = 0);
+    }
+
     /// Clips and answers, where the link has room; what is no bundle of the picture is not answered. Returns whether anything
     /// was sent. Bounded: a bundle for each peer.
-    pub fn serve(&mut self, link: &mut dyn Link, map: &TileMap, clip: &mut dyn FnMut((u32, u32)) -> Cliplist) -> bool {
+    pub fn serve(
+        &mut self,
+        link: &mut dyn Link,
+        picture: u16,
+        map: &TileMap,
+        clip: &mut dyn FnMut((u32, u32)) -> Cliplist,
+    ) -> bool {
         let mut sent = false;
         for _ in 0..self.turns.len() {
             let Some(peer) = self.turns.pop_front() else { break };
@@ -76,7 +87,7 @@ impl<'m> Clips<'m> {
             let went = link.send(peer, HEAD_BYTES_MAX + 4 * CLIPLIST_MAX, &mut |room| {
                 let pages = clip((first, count));
                 let message = Message::Cliplist { first, pages: pages.len() as u8 };
-                encode(&message, room, |body| {
+                encode(picture, &message, room, |body| {
                     body.chunks_exact_mut(4).zip(&pages).for_each(|(bytes, page)| {
                         bytes.copy_from_slice(&page.to_le_bytes());
                     });
@@ -98,6 +109,8 @@ pub struct Clipper<'m, 's> {
     scene: Scene<'s>,
     kernels: Kernels,
     picture: Option<Picture>,
+    /// Which picture of the run that is, or is to be.
+    number: u16,
     scratch: wide::Scratch,
     clips: Clips<'m>,
     counts: Counts,
@@ -108,12 +121,29 @@ impl<'m, 's> Clipper<'m, 's> {
     #[must_use]
     pub fn new(scene: Scene<'s>, kernels: Kernels, wanted: &'m mut [Unclipped], turns: &'m mut [Peer]) -> Self {
         let clips = Clips::new(wanted, Ring::new(turns));
-        Self { scene, kernels, picture: None, scratch: wide::Scratch::new(), clips, counts: Counts::default() }
+        Self {
+            scene,
+            kernels,
+            picture: None,
+            number: 0,
+            scratch: wide::Scratch::new(),
+            clips,
+            counts: Counts::default(),
+        }
     }
 
-    /// Takes in a message; those for other machines are passed over.
-    pub fn handle(&mut self, from: Peer, message: &Message) {
-        match *message {
+    /// Another picture comes: what was asked for before is not answered.
+    pub fn next(&mut self, number: u16) {
+        (self.picture, self.number) = (None, number);
+        self.clips.clear();
+    }
+
+    /// Takes in a message; those for other machines, and of other pictures, are passed over.
+    pub fn handle(&mut self, from: Peer, view: &View<'_>) {
+        if view.picture != self.number {
+            return;
+        }
+        match view.message {
             Message::Begin(frame) if from == HOST => self.picture = Picture::new(frame),
             Message::Clip { first, count } => self.clips.ask(from, first, count),
             _ => {}
@@ -127,9 +157,9 @@ impl<'m, 's> Clipper<'m, 's> {
 
     /// Sends cliplists. Returns whether there was any to send.
     pub fn serve(&mut self, link: &mut dyn Link) -> bool {
-        let Self { scene, kernels, picture, scratch, clips, counts } = self;
+        let Self { scene, kernels, picture, number, scratch, clips, counts } = self;
         let Some(picture) = picture else { return false };
-        clips.serve(link, &picture.map, &mut |tiles| clip(picture, scene, *kernels, tiles, scratch, counts))
+        clips.serve(link, *number, &picture.map, &mut |tiles| clip(picture, scene, *kernels, tiles, scratch, counts))
     }
 
     /// What clipping has met so far.
@@ -192,7 +222,7 @@ mod tests {
             .for_each(|&(p, f, c)| clips.ask(p, f, c));
         clips.lost(3);
         let mut serve = |clips: &mut Clips<'_>, wire: &mut Wire| {
-            clips.serve(wire, &map, &mut |(first, count)| {
+            clips.serve(wire, 0, &map, &mut |(first, count)| {
                 clipped.push((first, count));
                 (0..count).map(|at| 100 * first + at).collect()
             })

@@ -15,7 +15,7 @@ use crate::master::NO_MORE;
 use crate::policy::{Hand, Tiles, gives, missing};
 use crate::send;
 use hybray_link::{HOST, Link, Peer};
-use hybray_wire::Message;
+use hybray_wire::{Message, View};
 
 /// Runs that a node has at a time: one in work, and the next.
 const AHEAD: usize = 2;
@@ -186,6 +186,8 @@ impl Crew {
 pub struct Dispatcher<'m> {
     nodes: &'m mut [NodeState],
     options: Options,
+    /// Which picture of the run it is, or is to be.
+    picture: u16,
     /// Tiles of the picture; 0 until it begins.
     tiles: u32,
     /// Tiles to be given out: all, but for those that are kept.
@@ -217,6 +219,7 @@ impl<'m> Dispatcher<'m> {
         Self {
             nodes,
             options,
+            picture: 0,
             tiles: 0,
             wanted: 0,
             kept: TileSet(&mut []),
@@ -268,9 +271,26 @@ impl<'m> Dispatcher<'m> {
         self
     }
 
-    /// Takes in a message; those for other machines are passed over, and so is what only the host may say.
-    pub fn handle(&mut self, from: Peer, message: &Message, now: u64) {
-        match *message {
+    /// Waits for another picture, and for nodes to begin it: each picture is given out as if it were the first. Who is lost
+    /// stays so.
+    pub fn next(&mut self, picture: u16) {
+        for node in self.nodes.iter_mut() {
+            *node = NodeState { lost: node.lost, barred: node.barred, ..NodeState::default() };
+        }
+        self.kept.0.fill(0);
+        self.again.clear();
+        (self.picture, self.tiles, self.wanted, self.gathering) = (picture, 0, 0, false);
+        (self.cheapest, self.dearest, self.runs_done, self.overhead) = (u64::MAX, 0, 0, u64::MAX);
+    }
+
+    /// Takes in a message; those for other machines are passed over, and so are those about other pictures, and what only the
+    /// host may say.
+    pub fn handle(&mut self, from: Peer, view: &View<'_>, now: u64) {
+        if view.picture != self.picture {
+            return;
+        }
+        match view.message {
+            Message::End if from == HOST => self.next(self.picture.saturating_add(1)),
             Message::Begin(frame) if from == HOST => {
                 self.tiles = hybray_wire::TileMap::new(frame.width, frame.height).map_or(0, |map| map.len());
                 self.divide();
@@ -687,7 +707,7 @@ impl<'m> Dispatcher<'m> {
                 *peer != idle && node.here && node.helping.is_none() && node.helpers < HELPERS && node.dry_until <= now
             };
             let Some(peer) = (1..count).filter(may_be).min_by_key(key) else { return };
-            if send(link, peer as Peer, &Message::Share { with: idle as Peer }) {
+            if send(link, peer as Peer, self.picture, &Message::Share { with: idle as Peer }) {
                 self.nodes[idle].helping = Some(peer as Peer);
                 let helped = &mut self.nodes[peer];
                 (helped.asked, helped.helpers) = (helped.asked + 1, helped.helpers + 1);
@@ -748,7 +768,7 @@ impl<'m> Dispatcher<'m> {
                 }
                 let Some(run) = self.next_run(peer, &crew) else { continue };
                 let message = Message::Tiles { first: run.first, count: run.count, epoch: run.epoch };
-                if send(link, peer as Peer, &message) {
+                if send(link, peer as Peer, self.picture, &message) {
                     let node = &mut self.nodes[peer];
                     crew.in_hand += run.count;
                     crew.rates += if node.runs.is_empty() { crew.rate(node) } else { 0.0 };
@@ -762,7 +782,8 @@ impl<'m> Dispatcher<'m> {
         if self.is_idle() {
             for peer in 0..self.nodes.len() {
                 if self.nodes[peer].here && !self.nodes[peer].told {
-                    self.nodes[peer].told = send(link, peer as Peer, &Message::Finished { tile: u32::MAX });
+                    self.nodes[peer].told =
+                        send(link, peer as Peer, self.picture, &Message::Finished { tile: u32::MAX });
                 }
             }
         }

@@ -35,10 +35,10 @@ pub use server::{Asked, FETCHES, PART_BYTES, PageServer};
 use hybray_link::{Link, Peer};
 use hybray_wire::{HEAD_BYTES_MAX, Message, encode};
 
-/// Sends a message without a body; false if there is no room now.
-pub(crate) fn send(link: &mut dyn Link, to: Peer, message: &Message) -> bool {
+/// Sends a message about `picture` without a body; false if there is no room now.
+pub(crate) fn send(link: &mut dyn Link, to: Peer, picture: u16, message: &Message) -> bool {
     link.send(to, HEAD_BYTES_MAX, &mut |room| {
-        encode(message, room, |_| {}).expect("the room for a message is enough for any")
+        encode(picture, message, room, |_| {}).expect("the room for a message is enough for any")
     })
 }
 

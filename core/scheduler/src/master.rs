@@ -73,6 +73,9 @@ impl NodeReport {
 
 /// The machine. `nodes` has one entry for each peer, the host's (unused) included.
 pub struct Master<'m> {
+    /// Which picture of the run it is; and whether nodes are to wait for another.
+    number: u16,
+    last: bool,
     frame: Frame,
     film: Film<'m>,
     nodes: &'m mut [NodeReport],
@@ -93,10 +96,29 @@ pub struct Master<'m> {
 }
 
 impl<'m> Master<'m> {
-    /// Begins `frame` on `film`; tiles are given out by `dispatcher`.
+    /// Begins `frame` on `film`, the only picture; tiles are given out by `dispatcher`.
     pub fn new(frame: Frame, film: Film<'m>, nodes: &'m mut [NodeReport], scene_hash: u64, dispatcher: Peer) -> Self {
-        nodes.fill(NodeReport::default());
-        Self {
+        Self::of_run(0, true, frame, film, nodes, scene_hash, dispatcher)
+    }
+
+    /// Begins picture `number` of a run of several, from 0 on, when the one before is [`Outcome::Finished`]. `nodes` are as it
+    /// left them: who is lost stays so. After the `last` one the nodes end, and after one that is not finished.
+    pub fn of_run(
+        number: u16,
+        last: bool,
+        frame: Frame,
+        film: Film<'m>,
+        nodes: &'m mut [NodeReport],
+        scene_hash: u64,
+        dispatcher: Peer,
+    ) -> Self {
+        for node in nodes.iter_mut() {
+            let before = if number == 0 { NodeReport::default() } else { *node };
+            *node = NodeReport { greeted: before.greeted, lost: before.lost, ..NodeReport::default() };
+        }
+        let mut master = Self {
+            number,
+            last,
             frame,
             film,
             nodes,
@@ -110,7 +132,9 @@ impl<'m> Master<'m> {
             asked_again: false,
             refused_frames: 0,
             rays: 0,
-        }
+        };
+        master.look_who_is_left();
+        master
     }
 
     /// The film.
@@ -182,6 +206,9 @@ impl<'m> Master<'m> {
     /// Takes in a message; those for other machines are passed over.
     pub fn handle(&mut self, from: Peer, view: &View<'_>) {
         let Some(node) = self.nodes.get_mut(usize::from(from)) else { return };
+        if view.picture != self.number {
+            return;
+        }
         match view.message {
             Message::Hello { version, scene } => {
                 node.greeted = true;
@@ -210,19 +237,26 @@ impl<'m> Master<'m> {
         }
         // What is missing from now on may be missing for this reason: it is no second fault of the ledger.
         self.asked_again = false;
+        self.look_who_is_left();
+        self.look();
+    }
+
+    /// Without nodes, or without who gives out tiles, nothing is drawn.
+    fn look_who_is_left(&mut self) {
         let all = self.nodes.iter().skip(1).all(|n| n.lost);
-        if all || (peer == self.dispatcher && peer != HOST) {
+        let dispatcher =
+            self.dispatcher != HOST && self.nodes.get(usize::from(self.dispatcher)).is_some_and(|n| n.lost);
+        if all || dispatcher {
             self.end(Outcome::Abandoned);
         }
-        self.look();
     }
 
     /// When every node that is left has reported, nothing is on the way any more: a report comes after all
     /// contributions of its sender. A node whose first word has not arrived is waited for if something is missing: the
-    /// dispatcher may have heard of it long ago.
+    /// dispatcher may have heard of it long ago; and if another picture comes, so that nobody is ever two behind.
     fn look(&mut self) {
         let whole = self.film.is_finished();
-        let all = self.nodes.iter().skip(1).all(|n| n.reported || n.lost || (whole && !n.greeted));
+        let all = self.nodes.iter().skip(1).all(|n| n.reported || n.lost || (whole && self.last && !n.greeted));
         if !all || self.outcome.is_some() || self.looking.is_some() {
             return;
         }
@@ -247,7 +281,7 @@ impl<'m> Master<'m> {
         let tiles = if self.film.finished() > 0 { self.film.map().len() } else { 0 };
         while let Some(first) = (self.kept..tiles).find(|&tile| self.film.tile_is_finished(tile)) {
             let count = (first..tiles).take_while(|&tile| self.film.tile_is_finished(tile)).count() as u32;
-            if !send(link, self.dispatcher, &Message::Kept { first, count }) {
+            if !send(link, self.dispatcher, self.number, &Message::Kept { first, count }) {
                 return false;
             }
             self.kept = first + count;
@@ -264,7 +298,7 @@ impl<'m> Master<'m> {
             if !self.nodes[peer].lost {
                 // Who gives out tiles hears which of them are not wanted before it hears of the picture.
                 let ready = peer != usize::from(self.dispatcher) || self.tell_kept(link);
-                if !(ready && send(link, peer as Peer, &Message::Begin(self.frame))) {
+                if !(ready && send(link, peer as Peer, self.number, &Message::Begin(self.frame))) {
                     break;
                 }
             }
@@ -273,7 +307,7 @@ impl<'m> Master<'m> {
         for _ in 0..16 {
             let Some(tile) = self.looking else { break };
             let epoch = self.film.epoch(tile).saturating_add(1);
-            if !send(link, self.dispatcher, &Message::Again { tile, epoch }) {
+            if !send(link, self.dispatcher, self.number, &Message::Again { tile, epoch }) {
                 break;
             }
             let unfinished = |next: &u32| !self.film.tile_is_finished(*next);
@@ -283,9 +317,11 @@ impl<'m> Master<'m> {
             };
         }
         if let Some(from) = self.stopping {
+            let goes_on = self.outcome == Some(Outcome::Finished) && !self.last;
+            let message = if goes_on { Message::End } else { Message::Stop };
             let mut next = from;
             while next < self.nodes.len() {
-                if !self.nodes[next].lost && !send(link, next as Peer, &Message::Stop) {
+                if !self.nodes[next].lost && !send(link, next as Peer, self.number, &message) {
                     break;
                 }
                 next += 1;

@@ -91,7 +91,7 @@ impl<'m> PageServer<'m> {
                 let part = &part[..part.len().min(PART_BYTES)];
                 let message = Message::Part { page, offset, bytes: part.len() as u16 };
                 let went = link.send(peer, HEAD_BYTES_MAX + part.len(), &mut |room| {
-                    encode(&message, room, |body| body.copy_from_slice(part))
+                    encode(0, &message, room, |body| body.copy_from_slice(part))
                         .expect("the room for a message is enough for any")
                 });
                 sent |= went;

@@ -59,12 +59,12 @@ fn check_with(tiles: u32, runs: &[Message], from: Peer, message: Message, expect
     let mut node = Node::new(scene, All(&pages, &[]), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
     // The way to the dispatcher is full for a while.
     let mut link = Sent { refused: 2, ..Sent::default() };
-    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8 * tiles, 8, 1)), body: &[] });
+    node.handle(HOST, &View { picture: 0, message: Message::Begin(Toy::frame(8 * tiles, 8, 1)), body: &[] });
     node.poll(&mut link, 0);
     link.taken.clear();
-    runs.iter().for_each(|run| node.handle(HOST, &View { message: *run, body: &[] }));
+    runs.iter().for_each(|run| node.handle(HOST, &View { picture: 0, message: *run, body: &[] }));
     let body = vec![0; message.body_bytes()];
-    node.handle(from, &View { message, body: &body });
+    node.handle(from, &View { picture: 0, message, body: &body });
     for now in 1..8 {
         node.step(&mut || 0);
         node.poll(&mut link, now);
@@ -126,8 +126,8 @@ fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
         Node::new(toy.scene(&pages), All(&pages, &[]), SCENE_HASH, Kernels::Portable, 2, HOST, settings, memory);
     // The way to the dispatcher is full for a while.
     let mut link = Sent { refused: 2, ..Sent::default() };
-    node.handle(HOST, &View { message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
-    node.handle(HOST, &View { message: Message::Tiles { first: 0, count: 1, epoch: 0 }, body: &[] });
+    node.handle(HOST, &View { picture: 0, message: Message::Begin(Toy::frame(8, 8, 1)), body: &[] });
+    node.handle(HOST, &View { picture: 0, message: Message::Tiles { first: 0, count: 1, epoch: 0 }, body: &[] });
     let mut turn = |node: &mut Node<'_, '_, All<'_>>| {
         (0..3).for_each(|now| {
             node.step(&mut || 0);
@@ -150,7 +150,7 @@ fn traced(subhosts: u16, events: &[Happens<'_>]) -> Vec<u64> {
 fn a_bundle_waits_for_its_cliplist() {
     let from = |peer| {
         move |node: &mut Node<'_, '_, All<'_>>| {
-            node.handle(peer, &View { message: Message::Cliplist { first: 0, pages: 1 }, body: &[0; 4] });
+            node.handle(peer, &View { picture: 0, message: Message::Cliplist { first: 0, pages: 1 }, body: &[0; 4] });
         }
     };
     assert_eq!(traced(2, &[]), [64], "who clips for itself");

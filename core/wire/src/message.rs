@@ -122,7 +122,7 @@ pub enum Message {
         /// Its new epoch.
         epoch: u16,
     },
-    /// Node to host, at the end: what it did.
+    /// Node to host, at the end: what it did for this picture.
     Report {
         /// What it traced.
         counts: Counts,
@@ -211,7 +211,12 @@ pub enum Message {
         /// How many pages, [`CLIPLIST_MAX`] at most.
         pages: u8,
     },
+    /// Host to all nodes: this picture ends, say what you did for it, and wait for the next.
+    End,
 }
+
+/// What a frame of any picture but the first begins with: no message has this number.
+const LATER: u8 = 0x7f;
 
 /// Pages of a cliplist at most.
 pub const CLIPLIST_MAX: usize = 8;
@@ -245,10 +250,19 @@ pub enum WireError {
 /// A message and its body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View<'a> {
+    /// The picture that it is about: 0 is the first of a run.
+    pub picture: u16,
     /// The head.
     pub message: Message,
     /// What the head announces; empty for most messages.
     pub body: &'a [u8],
+}
+
+impl From<Message> for View<'_> {
+    /// A message about the first picture, without a body.
+    fn from(message: Message) -> Self {
+        Self { picture: 0, message, body: &[] }
+    }
 }
 
 impl Message {
@@ -268,13 +282,23 @@ impl Message {
     }
 }
 
-/// Writes a message into `room`; `body` is called to write the body. Returns the bytes used.
+/// Writes a message about `picture` into `room`; `body` is called to write the body. Returns the bytes used.
 ///
 /// # Errors
 /// If it does not fit.
-pub fn encode(message: &Message, room: &mut [u8], body: impl FnOnce(&mut [u8])) -> Result<usize, WireError> {
+pub fn encode(
+    picture: u16,
+    message: &Message,
+    room: &mut [u8],
+    body: impl FnOnce(&mut [u8]),
+) -> Result<usize, WireError> {
     let bytes = room.len();
-    let head = postcard::to_slice(message, room).map_err(|_| WireError::Room(bytes))?.len();
+    // One picture, as most runs have, is not told from others: nothing is paid for what is not there.
+    let head = match picture {
+        0 => postcard::to_slice(message, room),
+        _ => postcard::to_slice(&(LATER, picture, message), room),
+    };
+    let head = head.map_err(|_| WireError::Room(bytes))?.len();
     let all = head + message.body_bytes();
     body(room.get_mut(head..all).ok_or(WireError::Room(bytes))?);
     Ok(all)
@@ -285,6 +309,10 @@ pub fn encode(message: &Message, room: &mut [u8], body: impl FnOnce(&mut [u8])) 
 /// # Errors
 /// See [`WireError`].
 pub fn decode(bytes: &[u8]) -> Result<View<'_>, WireError> {
+    let (picture, bytes) = match bytes {
+        [LATER, rest @ ..] => postcard::take_from_bytes::<u16>(rest).map_err(|_| WireError::Head)?,
+        _ => (0, bytes),
+    };
     let (message, body) = postcard::take_from_bytes::<Message>(bytes).map_err(|_| WireError::Head)?;
     if let Message::Contributions { width, height, .. } = message
         && (u32::from(width) > TILE || u32::from(height) > TILE)
@@ -300,7 +328,7 @@ pub fn decode(bytes: &[u8]) -> Result<View<'_>, WireError> {
     if body.len() != message.body_bytes() {
         return Err(WireError::Body { bytes: body.len(), expected: message.body_bytes() });
     }
-    Ok(View { message, body })
+    Ok(View { picture, message, body })
 }
 
 #[cfg(test)]
@@ -325,13 +353,17 @@ mod tests {
 
     fn check(message: Message) {
         let mut room = [0; MESSAGE_BYTES_MAX];
-        let used = encode(&message, &mut room, |body| body.fill(7)).unwrap();
-        let view = decode(&room[..used]).unwrap();
-        assert_eq!(view.message, message);
-        assert!(view.body.iter().all(|&b| b == 7));
-        assert!(decode(&room[..used - 1]).is_err(), "cut short: {message:?}");
-        assert!(decode(&room[..(used + 1).min(room.len())]).is_err() || used == room.len(), "too long: {message:?}");
-        assert!(encode(&message, &mut room[..used - 1], |_| {}).is_err());
+        for picture in [0, 1, 127, 128, u16::MAX] {
+            let used = encode(picture, &message, &mut room, |body| body.fill(7)).unwrap();
+            assert!(used - message.body_bytes() <= HEAD_BYTES_MAX, "{message:?}");
+            let view = decode(&room[..used]).unwrap();
+            assert_eq!((view.picture, view.message), (picture, message));
+            assert!(view.body.iter().all(|&b| b == 7));
+            assert!(decode(&room[..used - 1]).is_err(), "cut short: {message:?}");
+            let more = (used + 1).min(room.len());
+            assert!(decode(&room[..more]).is_err() || used == room.len(), "too long: {message:?}");
+            assert!(encode(picture, &message, &mut room[..used - 1], |_| {}).is_err());
+        }
     }
 
     #[test]
@@ -363,6 +395,7 @@ mod tests {
         };
         check(Message::Report { counts, tiles: u32::MAX, runs: u32::MAX, busy_nanoseconds: most });
         check(Message::Stop);
+        check(Message::End);
         check(Message::Rays { rays: 100, shadows: 100, load: u16::MAX });
         check(Message::Took { taken: false, load: u16::MAX });
         check(Message::Partials { count: 400 });
@@ -384,6 +417,10 @@ mod tests {
         check(Message::Part { page: 0, offset: 65_535, bytes: 16_384 });
         assert_eq!(decode(&[]), Err(WireError::Head));
         assert_eq!(decode(&[200]), Err(WireError::Head));
+        assert_eq!(decode(&[LATER]), Err(WireError::Head));
+        assert_eq!(decode(&[LATER, 1]), Err(WireError::Head));
+        assert_eq!(decode(&[LATER, 1, LATER, 1, 8]), Err(WireError::Head), "a number is given once");
+        assert_eq!(decode(&[LATER, 0xff, 0xff, 4, 8]), Err(WireError::Head), "a number of 17 bits");
     }
 
     /// The examples of docs/WIRE.md.
@@ -391,9 +428,12 @@ mod tests {
     fn heads_are_as_the_specification_has_them() {
         let check = |message: Message, expected: &[u8]| {
             let mut room = [0; MESSAGE_BYTES_MAX];
-            let used = encode(&message, &mut room, |_| {}).unwrap();
+            let used = encode(0, &message, &mut room, |_| {}).unwrap();
             assert_eq!(&room[..expected.len()], expected, "{message:?}");
             assert_eq!(used, expected.len() + message.body_bytes(), "{message:?}");
+            let used = encode(300, &message, &mut room, |_| {}).unwrap();
+            assert_eq!((&room[..3], &room[3..3 + expected.len()]), (&[0x7f, 0xac, 2][..], expected), "{message:?}");
+            assert_eq!(used, 3 + expected.len() + message.body_bytes(), "{message:?}");
         };
         let scene = 0x0123_4567_89ab_cdef;
         check(Message::Hello { version: 3, scene }, &[0, 3, 0xef, 0x9b, 0xaf, 0xcd, 0xf8, 0xac, 0xd1, 0x91, 1]);
@@ -470,7 +510,7 @@ mod tests {
                 }
             };
             let mut room = [0; 2048];
-            let mut used = encode(&message, &mut room, |body| body.fill(0x80)).unwrap();
+            let mut used = encode(0, &message, &mut room, |body| body.fill(0x80)).unwrap();
             match next(4) {
                 0 => used = next(used as u64 + 1) as usize,
                 1 => used += next(9) as usize,

@@ -39,20 +39,23 @@ enum Arrival<'a> {
     Lost { peer: u16 },
 }
 
-/// Runs a node, and a dispatcher beside it if it has one, until it is told to stop or the host is lost.
-pub fn run_node<P: Store>(
-    node: &mut Node<'_, '_, P>,
+/// Runs a node, and a dispatcher beside it if it has one, until it is told to stop or the host is lost. `ended` looks at it
+/// when it has done its last for a picture, whose number it hears.
+pub fn run_node<'m, 's, P: Store>(
+    node: &mut Node<'m, 's, P>,
     mut dispatcher: Option<Dispatcher<'_>>,
     link: &mut dyn Link,
     clock: &mut dyn FnMut() -> u64,
+    ended: &mut dyn FnMut(u16, &Node<'m, 's, P>),
 ) {
+    let mut picture = node.picture();
     while !node.is_stopped() {
         let now = clock();
         let mut host_lost = false;
         let mut busy = receive(link, |arrival| match arrival {
             Arrival::Message { from, view } => {
                 if let Some(dispatcher) = &mut dispatcher {
-                    dispatcher.handle(from, &view.message, now);
+                    dispatcher.handle(from, &view, now);
                 }
                 node.handle(from, &view);
             }
@@ -66,7 +69,11 @@ pub fn run_node<P: Store>(
             Arrival::Nonsense => {}
         });
         if host_lost {
-            return;
+            break;
+        }
+        if node.picture() != picture {
+            ended(picture, node);
+            picture = node.picture();
         }
         busy |= node.step(clock);
         busy |= node.poll(link, clock());
@@ -77,9 +84,11 @@ pub fn run_node<P: Store>(
             link.wait(WAIT);
         }
     }
+    ended(picture, node);
 }
 
-/// Who looks on while a picture is drawn, beside the master. A closure that looks at the progress alone is one too.
+/// Who looks on while a picture is drawn, beside the master: of several pictures each begins and ends in turn. A closure that
+/// looks at the progress alone is one too.
 pub trait Watch {
     /// Before anything is said to nodes: tiles that are finished already may be put into the film ([`Film::keep`]). The
     /// picture ends as it is when it returns false.
@@ -101,12 +110,13 @@ impl<F: FnMut(Progress) -> bool> Watch for F {
 }
 
 /// Runs the master, and a dispatcher and a clipper beside it if it has them, until the picture has ended. `server` gives out
-/// the bytes of `pages` that nodes ask the host for.
+/// the bytes of `pages` that nodes ask the host for. Before another picture of the run, dispatcher and clipper are to be told
+/// of it ([`Dispatcher::next`], [`Clipper::next`]).
 pub fn run_master(
     master: &mut Master<'_>,
-    mut dispatcher: Option<Dispatcher<'_>>,
-    mut clipper: Option<Clipper<'_, '_>>,
-    mut server: PageServer<'_>,
+    mut dispatcher: Option<&mut Dispatcher<'_>>,
+    mut clipper: Option<&mut Clipper<'_, '_>>,
+    server: &mut PageServer<'_>,
     pages: &[&[u8]],
     link: &mut dyn Link,
     clock: &mut dyn FnMut() -> u64,
@@ -120,10 +130,10 @@ pub fn run_master(
         let mut busy = receive(link, |arrival| match arrival {
             Arrival::Message { from, view } => {
                 if let Some(dispatcher) = &mut dispatcher {
-                    dispatcher.handle(from, &view.message, now);
+                    dispatcher.handle(from, &view, now);
                 }
                 if let Some(clipper) = &mut clipper {
-                    clipper.handle(from, &view.message);
+                    clipper.handle(from, &view);
                 }
                 if let Message::Fetch { page } = view.message {
                     server.fetch(from, page);

@@ -80,10 +80,11 @@ impl Link for Turn<'_> {
         let Self { network, machine, me, now_ns, run_ns, computing_ns, gaps, said } = self;
         network.send(*me, to, *now_ns, bytes_max, &mut |room| {
             let mut used = write(room);
-            let message = decode(&room[..used]).ok().map(|view| view.message);
+            let view = decode(&room[..used]).ok();
+            let (picture, message) = (view.map_or(0, |view| view.picture), view.map(|view| view.message));
             if let Some(message @ (Message::Done { .. } | Message::Report { .. })) = message {
                 let message = timed(message, run_ns, *computing_ns);
-                used = encode(&message, room, |_| {}).expect("the room for a message is enough for any");
+                used = encode(picture, &message, room, |_| {}).expect("the room for a message is enough for any");
             }
             // What one says to oneself is a call.
             if to != *me {

@@ -174,10 +174,10 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             match arrival {
                 Arrival::Message { from, view } => {
                     if dispatches {
-                        dispatcher.handle(from, &view.message, now);
+                        dispatcher.handle(from, &view, now);
                     }
                     if let Some(clipper) = clipper {
-                        clipper.handle(from, &view.message);
+                        clipper.handle(from, &view);
                     }
                     if let Message::Fetch { page } = view.message {
                         server.fetch(from, page);
@@ -216,7 +216,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
         let taken = take(network, farm.machine, me, now, |arrival, now| match arrival {
             Arrival::Message { from, view } => {
                 if dispatches {
-                    dispatcher.handle(from, &view.message, now);
+                    dispatcher.handle(from, &view, now);
                 }
                 gaps.heard(me, from, &view.message, pages, now);
                 seat.worker.handle(from, &view);

@@ -84,8 +84,8 @@ fn begin(tiles: u32) -> Message {
 fn dispatcher(states: &mut [NodeState], tiles: u32, options: Options) -> Dispatcher<'_> {
     let nodes = states.len() as Peer;
     let mut d = Dispatcher::new(states, options);
-    d.handle(HOST, &begin(tiles), 0);
-    (1..nodes).for_each(|node| d.handle(node, &HELLO, 0));
+    d.handle(HOST, &begin(tiles).into(), 0);
+    (1..nodes).for_each(|node| d.handle(node, &HELLO.into(), 0));
     d
 }
 
@@ -95,7 +95,7 @@ fn states(nodes: usize) -> Vec<NodeState> {
 
 fn done(d: &mut Dispatcher<'_>, node: Peer, nanoseconds: u64, now: u64) {
     let run = *d.nodes[usize::from(node)].runs.front().unwrap();
-    d.handle(node, &Message::Done { first: run.first, count: run.count, nanoseconds }, now);
+    d.handle(node, &Message::Done { first: run.first, count: run.count, nanoseconds }.into(), now);
 }
 
 #[test]
@@ -104,13 +104,13 @@ fn tiles_that_are_kept_are_not_given_out() {
     let mut d = Dispatcher::new(&mut states, FIXED).keeping(&mut bits);
     let keep = |first, count| Message::Kept { first, count };
     // Nobody but the host knows, and what lies beyond the bits is not remembered.
-    d.handle(1, &keep(0, 100), 0);
+    d.handle(1, &keep(0, 100).into(), 0);
     [keep(0, 2), keep(10, 1), keep(60, 10), keep(126, u32::MAX), keep(u32::MAX, 1)].iter().for_each(|message| {
-        d.handle(HOST, message, 0);
+        d.handle(HOST, &(*message).into(), 0);
     });
-    d.handle(HOST, &begin(130), 0);
-    d.handle(HOST, &keep(30, 10), 0);
-    d.handle(1, &HELLO, 0);
+    d.handle(HOST, &begin(130).into(), 0);
+    d.handle(HOST, &keep(30, 10).into(), 0);
+    d.handle(1, &HELLO.into(), 0);
     assert_eq!(d.left(), 130 - 2 - 1 - 10 - 2);
     // A run that there was no room for comes back, and is sent later.
     let mut given = Vec::new();
@@ -135,13 +135,13 @@ fn tiles_that_are_kept_are_not_given_out() {
 fn where_every_tile_is_kept_nodes_hear_the_end_at_once() {
     let (mut states, mut bits, mut wire) = (states(2), [0; 1], Wire::new());
     let mut d = Dispatcher::new(&mut states, FIXED).biased(true).keeping(&mut bits);
-    d.handle(HOST, &Message::Kept { first: 0, count: 9 }, 0);
-    d.handle(2, &HELLO, 0);
+    d.handle(HOST, &Message::Kept { first: 0, count: 9 }.into(), 0);
+    d.handle(2, &HELLO.into(), 0);
     d.poll(&mut wire, 0);
     assert!(wire.told.is_empty(), "there is no picture yet");
-    d.handle(HOST, &begin(9), 0);
+    d.handle(HOST, &begin(9).into(), 0);
     d.poll(&mut wire, 0);
-    d.handle(1, &HELLO, 0);
+    d.handle(1, &HELLO.into(), 0);
     d.poll(&mut wire, 0);
     assert_eq!((wire.take(), wire.told), (vec![], vec![2, 1]));
 }
@@ -214,13 +214,13 @@ fn what_a_lost_node_had_is_shared_by_the_others() {
     d.poll(&mut wire, 24);
     // Half to each, then half of what is left, and so on; a run that was lost twice is older still.
     assert_eq!(wire.take()[..2], [(2, 0, 12, 2), (3, 12, 6, 2)]);
-    d.handle(1, &HELLO, 30);
+    d.handle(1, &HELLO.into(), 30);
     d.poll(&mut wire, 30);
     assert!(wire.take().iter().all(|sent| sent.0 != 1), "who is lost does not come back");
 }
 
 fn again(d: &mut Dispatcher<'_>, tile: u32, epoch: u16) {
-    d.handle(HOST, &Message::Again { tile, epoch }, 0);
+    d.handle(HOST, &Message::Again { tile, epoch }.into(), 0);
 }
 
 /// Runs that wait to be given out again: first, count, epoch.
@@ -237,7 +237,7 @@ fn tiles_that_are_wanted_again_make_runs() {
     }
     assert_eq!(waiting(&d), [(3, 3, 1), (7, 1, 1), (8, 2, 2)]);
     // Nobody but the host may ask, and for no tile that is not there.
-    d.handle(1, &Message::Again { tile: 20, epoch: 1 }, 0);
+    d.handle(1, &Message::Again { tile: 20, epoch: 1 }.into(), 0);
     again(&mut d, 1000, 1);
     again(&mut d, NO_MORE - 1, 1);
     assert_eq!(waiting(&d).len(), 3);
@@ -371,14 +371,14 @@ fn a_node_proves_itself_before_it_gets_much() {
 fn only_the_host_begins_and_only_the_oldest_run_is_done() {
     let (mut states, mut wire) = (states(1), Wire::new());
     let mut d = dispatcher(&mut states, 64, Options { spread: Some(8.0), atomic: Some(4), ..Options::default() });
-    d.handle(1, &begin(2), 0);
+    d.handle(1, &begin(2).into(), 0);
     assert_eq!(d.tiles, 64);
     d.poll(&mut wire, 0);
     let before = d.nodes[1].runs.clone();
     for (from, first, count) in [(1, 1, 4), (1, 0, 3), (0, 0, 4), (9, 0, 4), (Peer::MAX, 0, 64), (1, u32::MAX, 0)] {
-        d.handle(from, &Message::Done { first, count, nanoseconds: 1 }, 1);
+        d.handle(from, &Message::Done { first, count, nanoseconds: 1 }.into(), 1);
     }
-    d.handle(77, &HELLO, 0);
+    d.handle(77, &HELLO.into(), 0);
     d.lost(77);
     assert_eq!(d.nodes[1].runs, before);
 }
@@ -389,21 +389,21 @@ fn who_has_nothing_is_shared_with_once_at_a_time() {
     let mut nodes = vec![NodeState::default(); 4];
     let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
     let mut wire = Wire::new();
-    dispatcher.handle(HOST, &begin(8), 0);
-    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.handle(HOST, &begin(8).into(), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO.into(), 0));
     dispatcher.poll(&mut wire, 0);
     let with_runs: Vec<Peer> = wire.sent.iter().map(|run| run.0).collect();
     assert_eq!(with_runs, [1, 2]);
     assert_eq!(wire.shared, [(1, 3)]);
     dispatcher.poll(&mut wire, 1);
     assert_eq!(wire.shared.len(), 1);
-    dispatcher.handle(3, &Message::Idle { given: true }, 2);
+    dispatcher.handle(3, &Message::Idle { given: true }.into(), 2);
     dispatcher.poll(&mut wire, 2);
     assert_eq!(wire.shared[1..], [(2, 3)]);
     // Who has no run any more may still have rays; but not who is being helped.
-    dispatcher.handle(3, &Message::Idle { given: true }, 3);
+    dispatcher.handle(3, &Message::Idle { given: true }.into(), 3);
     for (peer, first, count, _) in wire.sent.clone() {
-        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
+        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }.into(), 3);
     }
     dispatcher.poll(&mut wire, 4);
     assert_eq!(wire.shared[2..], [(3, 1), (3, 2)]);
@@ -419,26 +419,26 @@ fn what_is_not_begun_goes_to_who_has_nothing() {
     let mut nodes = vec![NodeState::default(); 4];
     let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
     let mut wire = Wire::new();
-    dispatcher.handle(HOST, &begin(8), 0);
-    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.handle(HOST, &begin(8).into(), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO.into(), 0));
     dispatcher.poll(&mut wire, 0);
     assert_eq!(wire.take(), [(1, 0, 4, 0), (2, 4, 4, 0)]);
     assert_eq!(wire.shared, [(1, 3)]);
     for (from, first, count) in [(1, 2, 1), (1, 0, 5), (1, 4, 0), (1, 6, 2), (2, 2, 2), (3, 2, 2), (9, 2, 2)] {
-        dispatcher.handle(from, &Message::Back { with: 3, first, count }, 1);
+        dispatcher.handle(from, &Message::Back { with: 3, first, count }.into(), 1);
         dispatcher.poll(&mut wire, 1);
         assert_eq!(wire.take(), [], "{from}: {first}, {count}");
     }
-    dispatcher.handle(1, &Message::Back { with: 3, first: 2, count: 2 }, 2);
+    dispatcher.handle(1, &Message::Back { with: 3, first: 2, count: 2 }.into(), 2);
     dispatcher.poll(&mut wire, 2);
     assert_eq!(wire.take(), [(3, 2, 2, 0)]);
     // Whoever is through with them can be helped again.
-    dispatcher.handle(3, &Message::Done { first: 2, count: 2, nanoseconds: 5 }, 3);
+    dispatcher.handle(3, &Message::Done { first: 2, count: 2, nanoseconds: 5 }.into(), 3);
     dispatcher.poll(&mut wire, 3);
     assert_eq!((wire.shared.len(), wire.shared[1].1), (2, 3));
     for (peer, first, count) in [(1, 0, 4), (1, 0, 2), (2, 4, 4)] {
         assert!(!dispatcher.is_idle());
-        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }, 3);
+        dispatcher.handle(peer, &Message::Done { first, count, nanoseconds: 5 }.into(), 3);
     }
     assert!(dispatcher.is_idle());
 }
@@ -449,14 +449,14 @@ fn who_had_nothing_to_share_is_left_alone() {
     let mut nodes = vec![NodeState::default(); 3];
     let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
     let mut wire = Wire::new();
-    dispatcher.handle(HOST, &begin(8), 0);
-    dispatcher.handle(1, &HELLO, 0);
+    dispatcher.handle(HOST, &begin(8).into(), 0);
+    dispatcher.handle(1, &HELLO.into(), 0);
     dispatcher.poll(&mut wire, 0);
     assert_eq!(wire.take(), [(1, 0, 4, 0), (1, 4, 4, 0)]);
-    dispatcher.handle(2, &HELLO, 0);
+    dispatcher.handle(2, &HELLO.into(), 0);
     dispatcher.poll(&mut wire, 0);
     assert_eq!(wire.shared, [(1, 2)]);
-    dispatcher.handle(2, &Message::Idle { given: false }, 1);
+    dispatcher.handle(2, &Message::Idle { given: false }.into(), 1);
     dispatcher.poll(&mut wire, 1);
     assert_eq!(wire.shared, [(1, 2)]);
     let mut last = 1;
@@ -466,10 +466,10 @@ fn who_had_nothing_to_share_is_left_alone() {
         last += wait;
         dispatcher.poll(&mut wire, last);
         assert_eq!(wire.shared.len(), times);
-        dispatcher.handle(2, &Message::Idle { given: false }, last);
+        dispatcher.handle(2, &Message::Idle { given: false }.into(), last);
     }
     wire.shared.clear();
-    dispatcher.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 5 }, last);
+    dispatcher.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 5 }.into(), last);
     dispatcher.poll(&mut wire, last);
     assert_eq!(wire.shared, [(1, 2)]);
 }
@@ -481,15 +481,15 @@ fn parts_are_given_out_by_halves() {
     let mut dispatcher =
         Dispatcher::new(&mut nodes, Options { atomic: Some(1), ..FIXED }).on(1).with_parts(&[0, 4, 20, 32]);
     let mut wire = Wire::new();
-    dispatcher.handle(HOST, &begin(32), 0);
-    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO, 0));
+    dispatcher.handle(HOST, &begin(32).into(), 0);
+    [1, 2, 3].into_iter().for_each(|peer| dispatcher.handle(peer, &HELLO.into(), 0));
     dispatcher.poll(&mut wire, 0);
     let given = wire.take();
     assert_eq!(given[..3], [(1, 0, 2, 0), (2, 4, 8, 0), (3, 20, 8, 0)]);
     assert_eq!(given[3..], [(1, 2, 1, 0), (2, 12, 1, 0), (3, 28, 1, 0)]);
     // All that is left after its own last tile is others'.
     for (first, count) in [(0, 2), (2, 1), (3, 1)] {
-        dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }, 1);
+        dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }.into(), 1);
         dispatcher.poll(&mut wire, 1);
     }
     assert_eq!(wire.take(), [(1, 3, 1, 0)]);
@@ -503,18 +503,18 @@ fn what_comes_back_may_be_of_the_run_before() {
         let mut nodes = vec![NodeState::default(); 3];
         let mut dispatcher = Dispatcher::new(&mut nodes, FIXED);
         let mut wire = Wire::new();
-        dispatcher.handle(HOST, &begin(8), 0);
-        dispatcher.handle(1, &HELLO, 0);
+        dispatcher.handle(HOST, &begin(8).into(), 0);
+        dispatcher.handle(1, &HELLO.into(), 0);
         dispatcher.poll(&mut wire, 0);
         assert_eq!(wire.take(), [(1, 0, 4, 0), (1, 4, 4, 0)]);
-        dispatcher.handle(1, &Message::Back { with: 2, first, count }, 1);
-        dispatcher.handle(2, &HELLO, 1);
+        dispatcher.handle(1, &Message::Back { with: 2, first, count }.into(), 1);
+        dispatcher.handle(2, &HELLO.into(), 1);
         dispatcher.poll(&mut wire, 1);
         assert_eq!(wire.take()[0], (2, first, count, 0));
-        dispatcher.handle(2, &Message::Done { first, count, nanoseconds: 5 }, 2);
+        dispatcher.handle(2, &Message::Done { first, count, nanoseconds: 5 }.into(), 2);
         for &(first, count) in ends {
             assert!(!dispatcher.is_idle());
-            dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }, 2);
+            dispatcher.handle(1, &Message::Done { first, count, nanoseconds: 5 }.into(), 2);
         }
         assert!(dispatcher.is_idle());
     }
@@ -523,7 +523,7 @@ fn what_comes_back_may_be_of_the_run_before() {
 /// A tile of a node comes back to the film.
 fn comes_back(d: &mut Dispatcher<'_>, node: Peer, tile: u32) {
     let message = Message::Contributions { tile, epoch: 0, width: 8, height: 8, rays: 1, entry: 1 };
-    d.handle(node, &message, 5);
+    d.handle(node, &message.into(), 5);
 }
 
 #[test]
@@ -535,7 +535,7 @@ fn pixels_are_counted_and_words_are_not_heard() {
     d.poll(&mut wire, 0);
     assert_eq!(wire.take(), [(1, 0, 8, 0), (2, 8, 8, 0)]);
     let (first, second) = (Message::Done { first: 0, count: 8, nanoseconds: 1 }, [7, 1, 4]);
-    d.handle(1, &first, 1);
+    d.handle(1, &first.into(), 1);
     d.poll(&mut wire, 1);
     assert_eq!(wire.take(), [], "a run that is done is no reason for another");
     second.into_iter().for_each(|tile| comes_back(&mut d, 1, tile));
@@ -549,7 +549,7 @@ fn pixels_are_counted_and_words_are_not_heard() {
     assert_eq!((d.nodes[1].in_hand(), d.nodes[2].in_hand()), (8, 8));
     // All of the second run come back before the last of the first.
     (16..20).for_each(|tile| comes_back(&mut d, 1, tile));
-    d.handle(1, &Message::Done { first: 16, count: 4, nanoseconds: 1 }, 4);
+    d.handle(1, &Message::Done { first: 16, count: 4, nanoseconds: 1 }.into(), 4);
     assert_eq!((d.nodes[1].runs.len(), d.nodes[1].in_hand()), (1, 4));
     // Who is lost leaves everything that it had, under a new epoch.
     d.lost(1);
@@ -569,7 +569,7 @@ fn tiles_that_never_come_back_are_given_up() {
     assert_eq!(wire.take(), [(1, 0, 4, 0), (2, 4, 4, 0)]);
     d.poll(&mut wire, 2 * SILENCE);
     assert_eq!(wire.take(), [], "who is at work is not silent");
-    d.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 1 }, SILENCE);
+    d.handle(1, &Message::Done { first: 0, count: 4, nanoseconds: 1 }.into(), SILENCE);
     d.poll(&mut wire, 2 * SILENCE);
     assert_eq!(wire.take(), []);
     d.poll(&mut wire, 2 * SILENCE + 1);
@@ -579,7 +579,7 @@ fn tiles_that_never_come_back_are_given_up() {
     assert_eq!(wire.take(), [(1, 12, 4, 0)]);
     for (node, first) in [(1, 8), (1, 12), (2, 4)] {
         assert!(!d.is_idle());
-        d.handle(node, &Message::Done { first, count: 4, nanoseconds: 1 }, 2 * SILENCE + 3);
+        d.handle(node, &Message::Done { first, count: 4, nanoseconds: 1 }.into(), 2 * SILENCE + 3);
     }
     assert!(d.is_idle(), "all is done, though not all has come back");
     again(&mut d, 5, 1);
@@ -592,14 +592,14 @@ fn tiles_that_never_come_back_are_given_up() {
 fn a_static_picture_is_divided_once() {
     let (mut states, mut wire) = (states(3), Wire::new());
     let mut d = Dispatcher::new(&mut states, Options { tiles: Tiles::Static, ..FIXED });
-    d.handle(HOST, &begin(64), 0);
-    d.handle(2, &HELLO, 0);
+    d.handle(HOST, &begin(64).into(), 0);
+    d.handle(2, &HELLO.into(), 0);
     d.poll(&mut wire, 0);
     assert_eq!(wire.take(), [(2, 20, 20, 0)]);
     done(&mut d, 2, 10, 10);
     // There is no room at first: nobody else may have what is given back.
     wire.room = 0;
-    [1, 3].iter().for_each(|&node| d.handle(node, &HELLO, 0));
+    [1, 3].iter().for_each(|&node| d.handle(node, &HELLO.into(), 0));
     d.poll(&mut wire, 11);
     wire.room = 9;
     d.poll(&mut wire, 12);
@@ -614,9 +614,9 @@ fn a_static_picture_is_divided_once() {
     // Who is lost before it had its part had it to give all the same.
     let mut states = super::tests::states(2);
     let mut d = Dispatcher::new(&mut states, Options { tiles: Tiles::Static, ..FIXED });
-    d.handle(HOST, &begin(16), 0);
+    d.handle(HOST, &begin(16).into(), 0);
     d.lost(1);
-    d.handle(2, &HELLO, 0);
+    d.handle(2, &HELLO.into(), 0);
     d.poll(&mut wire, 0);
     let mut tiles: Vec<u32> = wire.take().iter().flat_map(|run| run.1..run.1 + run.2).collect();
     tiles.sort_unstable();
@@ -630,8 +630,8 @@ fn who_is_barred_is_given_tiles_only_when_nobody_else_is_left() {
             let (mut states, mut wire) = (states(3), Wire::new());
             let mut d = Dispatcher::new(&mut states, Options { tiles, take_over: false, ..FIXED }).biased(biased);
             d = d.barring(&[false, true, false, true]);
-            d.handle(HOST, &begin(32), 0);
-            [1, 2, 3].iter().for_each(|&node| d.handle(node, &HELLO, 0));
+            d.handle(HOST, &begin(32).into(), 0);
+            [1, 2, 3].iter().for_each(|&node| d.handle(node, &HELLO.into(), 0));
             d.poll(&mut wire, 0);
             let runs = wire.take();
             assert!(!runs.is_empty() && runs.iter().all(|run| run.0 == 2), "{tiles:?}: {runs:?}");

@@ -51,7 +51,7 @@ const FRAME: Frame = Frame {
 };
 
 fn say(master: &mut Master<'_>, from: Peer, message: Message) {
-    master.handle(from, &View { message, body: &[] });
+    master.handle(from, &message.into());
 }
 
 fn report(master: &mut Master<'_>, from: Peer) {

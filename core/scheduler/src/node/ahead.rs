@@ -86,11 +86,11 @@ impl Ahead {
     }
 
     /// Asks the subhost. Returns whether anything was sent.
-    pub fn ask(&mut self, link: &mut dyn Link) -> bool {
+    pub fn ask(&mut self, link: &mut dyn Link, picture: u16) -> bool {
         let (Some(subhost), Some((first, count)), Stage::Wanted) = (self.subhost, self.bundle, self.stage) else {
             return false;
         };
-        let went = send(link, subhost, &Message::Clip { first, count: count as u8 });
+        let went = send(link, subhost, picture, &Message::Clip { first, count: count as u8 });
         self.stage = if went { Stage::Asked } else { Stage::Wanted };
         went
     }
@@ -191,9 +191,9 @@ mod tests {
         let mut wire = Wire(Vec::new(), false);
         ahead.come(3, 8, &body(&[1]), 10);
         assert!(!ahead.has((8, 4)), "nobody asked yet");
-        assert!(!ahead.ask(&mut wire), "no room");
+        assert!(!ahead.ask(&mut wire, 0), "no room");
         wire.1 = true;
-        assert!(ahead.ask(&mut wire) && !ahead.ask(&mut wire));
+        assert!(ahead.ask(&mut wire, 0) && !ahead.ask(&mut wire, 0));
         assert_eq!(wire.0, [(3, Message::Clip { first: 8, count: 4 })]);
         ahead.come(2, 8, &body(&[1]), 10);
         ahead.come(3, 4, &body(&[1]), 10);

@@ -136,7 +136,7 @@ impl<P: Store> Node<'_, '_, P> {
         for _ in 0..self.memory.peers.answers() {
             let Some((peer, taken)) = self.memory.peers.next_answer() else { break };
             let lost = self.memory.peers.get(peer).is_none_or(|p| p.lost);
-            let told = lost || send(link, peer, &Message::Took { taken, load: self.load() });
+            let told = lost || send(link, peer, self.number, &Message::Took { taken, load: self.load() });
             self.memory.peers.answered(told);
             sent |= told;
         }
@@ -147,6 +147,7 @@ impl<P: Store> Node<'_, '_, P> {
     /// better to do.
     pub(super) fn pay(&mut self, link: &mut dyn Link) -> bool {
         let mut sent = false;
+        let number = self.number;
         let (free, capacity) = (self.memory.partials.free(), self.memory.partials.capacity());
         let granularity = usize::from(self.settings.granularity);
         for _ in 0..self.memory.owing.len() {
@@ -165,7 +166,7 @@ impl<P: Store> Node<'_, '_, P> {
             let mut front = m.partials.split_front(list, count);
             let message = Message::Partials { count: count as u16 };
             let went = link.send(peer, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
-                encode(&message, room, |body| {
+                encode(number, &message, room, |body| {
                     for (bytes, partial) in body.chunks_exact_mut(size_of::<Partial>()).zip(m.partials.iter(&front)) {
                         bytes.copy_from_slice(bytes_of(partial));
                     }
@@ -193,7 +194,7 @@ impl<P: Store> Node<'_, '_, P> {
             let request = self.requests[at];
             let asked = self.requests.iter().filter(|r| r.sent && r.from == request.from).count();
             if !request.sent && rules::may_ask(asked) {
-                self.requests[at].sent = send(link, request.from, &Message::Fetch { page: request.page });
+                self.requests[at].sent = send(link, request.from, 0, &Message::Fetch { page: request.page });
                 sent |= self.requests[at].sent;
             }
         }
@@ -203,7 +204,7 @@ impl<P: Store> Node<'_, '_, P> {
     /// Sends rays to the nodes that have their pages. They stay in the pool until they are taken.
     pub(super) fn forward(&mut self, link: &mut dyn Link, now: u64) -> bool {
         let mut sent = false;
-        let idle = self.idle;
+        let (idle, number) = (self.idle, self.number);
         let granularity = usize::from(self.settings.granularity).clamp(1, RAYS_MAX);
         let compact = !self.scene.transmits;
         for _ in 0..self.memory.peers.sends() {
@@ -220,7 +221,7 @@ impl<P: Store> Node<'_, '_, P> {
             if state.outbox.is_empty() || !due || !rules::may_send(state.flight.len()) {
                 // After rays: whoever hears it asks for a share again, and the word would take their room on the link for ever.
                 if state.none_to_share {
-                    state.none_to_share = !send(link, peer, &Message::Rays { rays: 0, shadows: 0, load });
+                    state.none_to_share = !send(link, peer, self.number, &Message::Rays { rays: 0, shadows: 0, load });
                     sent |= !state.none_to_share;
                 }
                 if state.none_to_share || !state.outbox.is_empty() {
@@ -234,7 +235,7 @@ impl<P: Store> Node<'_, '_, P> {
             let shadows = m.pool.iter(&front).filter(is_compact).count();
             let message = Message::Rays { rays: (front.len() - shadows) as u16, shadows: shadows as u16, load };
             let went = link.send(peer, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
-                encode(&message, room, |body| {
+                encode(number, &message, room, |body| {
                     let (mut nearest, mut any) = body.split_at_mut((front.len() - shadows) * size_of::<RayRecord>());
                     for ray in m.pool.iter(&front) {
                         if is_compact(&ray) {
@@ -272,7 +273,7 @@ impl<P: Store> Node<'_, '_, P> {
     /// Sends the sums of finished tiles to the film.
     pub(super) fn send_tiles(&mut self, link: &mut dyn Link) -> bool {
         let Some(picture) = &self.picture else { return false };
-        let mut sent = false;
+        let (mut sent, number) = (false, self.number);
         for tile in self.memory.tiles.iter_mut().filter(|t| t.stage == TileStage::Finished) {
             let shape = picture.map.tile(tile.tile);
             let message = Message::Contributions {
@@ -285,7 +286,7 @@ impl<P: Store> Node<'_, '_, P> {
             };
             let sums = &tile.sums[..shape.pixels().min(TILE_PIXELS)];
             let went = link.send(HOST, HEAD_BYTES_MAX + message.body_bytes(), &mut |room| {
-                encode(&message, room, |body| {
+                encode(number, &message, room, |body| {
                     for (bytes, sum) in body.chunks_exact_mut(8).zip(sums.as_flattened()) {
                         bytes.copy_from_slice(&sum.to_le_bytes());
                     }

@@ -32,12 +32,13 @@ use crate::policy::{Grid, LinkCost, Policy, subhost};
 use crate::{rules, send};
 use ahead::Ahead;
 use begin::{InWork, Place, begin, next_bundle, primary, start_sample, trace_bundle};
+use hybray_arena::List;
 use hybray_bintree::walk::FROM_ROOT;
 use hybray_geometry::simd::Kernels;
 use hybray_link::{HOST, Link, Peer};
 use hybray_scene::Pages;
 use hybray_tracer::{Beyond, Lane, Scene, Walker, goes_together};
-use hybray_wire::{Counts, Message, RayRecord, View};
+use hybray_wire::{Counts, Frame, Message, RayRecord, View};
 use memory::Bundle;
 use tiles::{OpenTile, Stage as TileStage, Sums, TILE_PIXELS};
 use way::{Nothing, Way};
@@ -126,6 +127,22 @@ pub struct Traffic {
     pub nonsense: u64,
 }
 
+impl core::ops::Sub for Traffic {
+    type Output = Self;
+
+    /// What there was since `b`, an earlier count.
+    fn sub(self, b: Self) -> Self {
+        Self {
+            arrived: self.arrived.saturating_sub(b.arrived),
+            forwarded: self.forwarded.saturating_sub(b.forwarded),
+            refused: self.refused.saturating_sub(b.refused),
+            fetched: self.fetched.saturating_sub(b.fetched),
+            served: self.served.saturating_sub(b.served),
+            nonsense: self.nonsense.saturating_sub(b.nonsense),
+        }
+    }
+}
+
 /// Most that was ever in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HighWater {
@@ -203,6 +220,8 @@ pub struct Node<'m, 's, P: Store> {
     dispatcher: Peer,
     scene_hash: u64,
     picture: Option<Picture>,
+    /// Which picture of the run that is, or is to be.
+    number: u16,
     runs: heapless::Deque<Run, RUNS>,
     in_work: InWork,
     stage: Stage,
@@ -218,7 +237,8 @@ pub struct Node<'m, 's, P: Store> {
     /// Runs that are done and not yet told.
     done: heapless::Deque<Run, RUNS>,
     greeted: [bool; 2],
-    report: bool,
+    /// What it did for this picture is to be told.
+    report: Option<u16>,
     stopped: bool,
     counts: Counts,
     walk_counts: hybray_bintree::walk::Counts,
@@ -268,6 +288,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             dispatcher,
             scene_hash,
             picture: None,
+            number: 0,
             runs: heapless::Deque::new(),
             in_work: InWork { tiles: [(0, 0); TILES], count: 0, rays: 0, of_run: false },
             stage: Stage::Idle,
@@ -279,7 +300,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             looked_at: FROM_ROOT,
             done: heapless::Deque::new(),
             greeted: [false; 2],
-            report: false,
+            report: None,
             stopped: false,
             counts: Counts::default(),
             walk_counts: hybray_bintree::walk::Counts::default(),
@@ -297,10 +318,16 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         }
     }
 
+    /// Which picture of the run it draws, or waits for: 0 is the first.
+    #[must_use]
+    pub fn picture(&self) -> u16 {
+        self.number
+    }
+
     /// Whether it was told to end, and has said what it did.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.stopped && !self.report
+        self.stopped && self.report.is_none()
     }
 
     /// Boxes, blocks and pages of all walks so far.
@@ -346,17 +373,23 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         }
     }
 
-    /// Takes in a message; those for other machines, and those from peers that have no right to them, are passed over.
-    /// A node draws one picture.
+    /// Takes in a message; those for other machines, those from peers that have no right to them, and those about other
+    /// pictures are passed over. Pages are the same for all pictures.
     pub fn handle(&mut self, from: Peer, view: &View<'_>) {
         match view.message {
-            Message::Begin(frame) if from == HOST && self.picture.is_none() => {
-                self.picture = Picture::new(frame);
-                if let Some(Picture { frame, .. }) = &self.picture {
-                    self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
-                    self.scene.shading.weight_cutoff = frame.weight_cutoff;
-                }
-            }
+            Message::Stop if from == HOST => self.stop(),
+            Message::Fetch { page } => self.memory.server.fetch(from, page),
+            Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
+            _ if view.picture == self.number => self.handle_now(from, view),
+            _ => {}
+        }
+    }
+
+    /// A message about the picture that is drawn, or is to begin.
+    fn handle_now(&mut self, from: Peer, view: &View<'_>) {
+        match view.message {
+            Message::Begin(frame) if from == HOST && self.picture.is_none() => self.begin(frame),
+            Message::End if from == HOST && !self.stopped => self.end(),
             Message::Tiles { first, count, epoch } if from == self.dispatcher && !self.stopped => {
                 let fits = self
                     .picture
@@ -367,24 +400,67 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     self.runs_given += 1;
                 }
             }
-            Message::Finished { tile: u32::MAX } if from == self.dispatcher => self.report = true,
-            Message::Stop if from == HOST => self.stop(),
+            Message::Finished { tile: u32::MAX } if from == self.dispatcher => self.report = Some(self.number),
             Message::Rays { .. } | Message::Took { .. } | Message::Partials { .. } if !self.stopped => {
                 self.handle_rays(from, view);
             }
             Message::Share { with } if from == self.dispatcher && !self.stopped => self.share(with),
-            Message::Fetch { page } => self.memory.server.fetch(from, page),
             Message::Clip { first, count } => self.memory.clips.ask(from, first, count),
             Message::Cliplist { first, .. } => {
                 self.ahead.come(from, first, view.body, self.scene.resident.directory.entries.len());
             }
-            Message::Part { page, offset, .. } => self.handle_part(from, page, offset, view.body),
             _ => {}
         }
     }
 
-    /// What is in work is lost; what was done is still told.
+    /// Begins a picture, and counts anew.
+    fn begin(&mut self, frame: Frame) {
+        self.picture = Picture::new(frame);
+        if let Some(Picture { frame, .. }) = &self.picture {
+            self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
+            self.scene.shading.weight_cutoff = frame.weight_cutoff;
+        }
+        if self.number > 0 {
+            // A dispatcher that has begun hears that this node has begun, too.
+            self.greeted = [self.greeted[0] && self.dispatcher != HOST, false];
+            self.count_anew();
+        }
+    }
+
+    fn count_anew(&mut self) {
+        self.counts = Counts::default();
+        (self.tiles, self.runs_given, self.busy) = (0, 0, 0);
+    }
+
+    /// This picture ends and another comes. What is left of this one, such as rays under an old epoch, is lost; what was done
+    /// is still told. Pages stay, and those that were asked for still come.
+    fn end(&mut self) {
+        // The last that there can be is followed by none.
+        let Some(next) = self.number.checked_add(1) else { return };
+        self.give_up();
+        let memory = &mut self.memory;
+        memory.pool.clear();
+        memory.partials.clear();
+        memory.owed.fill(List::EMPTY);
+        while memory.owing.pop_front().is_some() {}
+        memory.peers.clear();
+        memory.clips.clear();
+        self.ahead.begin();
+        (self.helped, self.given) = (false, false);
+        (self.number, self.picture) = (next, None);
+    }
+
+    /// The program ends.
     fn stop(&mut self) {
+        if self.picture.is_none() {
+            self.count_anew();
+        }
+        self.give_up();
+        self.stopped = true;
+    }
+
+    /// What is in work is lost; what was done is still told.
+    fn give_up(&mut self) {
         self.runs.clear();
         self.done.clear();
         self.back = None;
@@ -392,8 +468,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         self.lit = Lit::default();
         (self.depth, self.aside) = (0, None);
         self.memory.tiles.fill(OpenTile::FREE);
-        self.stopped = true;
-        self.report = true;
+        self.report = Some(self.number);
     }
 
     /// A peer is gone. Rays that were there are gone with it, and nobody knows whose: the tiles that are open here are
@@ -683,14 +758,14 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             self.traffic.served += pages;
             sent |= parts;
             sent |= self.clip(link);
-            sent |= self.ahead.ask(link);
+            sent |= self.ahead.ask(link, self.number);
             self.decide(now);
             sent |= self.ask(link);
             sent |= self.forward(link, now);
         }
         sent |= self.send_tiles(link);
         if let Some(Back { with, first, count }) = self.back
-            && send(link, self.dispatcher, &Message::Back { with, first, count })
+            && send(link, self.dispatcher, self.number, &Message::Back { with, first, count })
         {
             self.back = None;
             sent = true;
@@ -698,7 +773,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         // The dispatcher must know how long a run is before it hears that it is done.
         while let Some(run) = self.done.front().filter(|_| self.back.is_none()) {
             let done = Message::Done { first: run.first, count: run.count, nanoseconds: run.nanoseconds };
-            if !send(link, self.dispatcher, &done) {
+            if !send(link, self.dispatcher, self.number, &done) {
                 break;
             }
             self.done.pop_front();
@@ -706,19 +781,25 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
         }
         let open = self.memory.tiles.iter().any(|t| t.stage != TileStage::Free);
         let told = self.done.is_empty() && self.back.is_none();
-        if self.report && self.runs.is_empty() && told && self.stage == Stage::Idle && !open {
+        if let Some(of) = self.report
+            && self.runs.is_empty()
+            && told
+            && self.stage == Stage::Idle
+            && !open
+        {
             let report = Message::Report {
                 counts: self.counts,
                 tiles: self.tiles,
                 runs: self.runs_given,
                 busy_nanoseconds: self.busy,
             };
-            self.report = !send(link, HOST, &report);
-            sent |= !self.report;
+            let went = send(link, HOST, of, &report);
+            self.report = self.report.filter(|_| !went);
+            sent |= went;
         }
         // Last: the words before it must not wait for room behind it for ever.
         if rules::says_idle(self.helped, self.idle, self.memory.pool.len()) {
-            self.helped = !send(link, self.dispatcher, &Message::Idle { given: self.given });
+            self.helped = !send(link, self.dispatcher, self.number, &Message::Idle { given: self.given });
             sent |= !self.helped;
         }
         sent
@@ -726,10 +807,12 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
 
     /// Makes cliplists for the nodes that this one is the subhost of.
     fn clip(&mut self, link: &mut dyn Link) -> bool {
-        let Self { picture, scene, kernels, memory, walk_counts, .. } = self;
+        let Self { picture, number, scene, kernels, memory, walk_counts, .. } = self;
         let Some(picture) = picture else { return false };
         let scratch = &mut memory.bundle.together.scratch;
-        memory.clips.serve(link, &picture.map, &mut |tiles| clip(picture, scene, *kernels, tiles, scratch, walk_counts))
+        memory.clips.serve(link, *number, &picture.map, &mut |tiles| {
+            clip(picture, scene, *kernels, tiles, scratch, walk_counts)
+        })
     }
 
     fn greet(&mut self, link: &mut dyn Link) -> bool {
@@ -740,7 +823,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
             if !self.greeted[i] && ready {
                 let twice = i == 1 && peer == HOST;
                 let hello = Message::Hello { version: hybray_wire::VERSION, scene: self.scene_hash };
-                self.greeted[i] = twice || send(link, peer, &hello);
+                self.greeted[i] = twice || send(link, peer, self.number, &hello);
                 sent |= self.greeted[i];
             }
         }

@@ -55,6 +55,13 @@ impl<'m> Peers<'m> {
         Self { all, answers, sends }
     }
 
+    /// Nothing is for anybody any more, or on its way; who is lost stays so. Lists are given up, and not emptied.
+    pub fn clear(&mut self) {
+        self.all.iter_mut().for_each(|peer| *peer = PeerState { lost: peer.lost, ..PeerState::NEW });
+        while self.answers.pop_front().is_some() {}
+        while self.sends.pop_front().is_some() {}
+    }
+
     /// How many there are, the host included.
     pub fn len(&self) -> usize {
         self.all.len()

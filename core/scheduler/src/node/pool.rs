@@ -58,6 +58,18 @@ impl<'m> Pool<'m> {
         Self { slab, pages, first_wanted: NOWHERE, last_wanted: NOWHERE, ready, ready_rays: 0, pushed: 0 }
     }
 
+    /// No ray waits any more; pages that were asked for still come. Lists elsewhere must be given up. Bounded: the rays and
+    /// pages, once.
+    pub fn clear(&mut self) {
+        self.slab.clear();
+        for page in self.pages.iter_mut() {
+            *page = PageState { uses: page.uses, asked: page.asked, ..PageState::NEW };
+        }
+        (self.first_wanted, self.last_wanted) = (NOWHERE, NOWHERE);
+        while self.ready.pop_front().is_some() {}
+        self.ready_rays = 0;
+    }
+
     /// Records that are free.
     pub fn free(&self) -> usize {
         self.slab.free()

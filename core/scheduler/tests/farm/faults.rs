@@ -234,7 +234,7 @@ fn what_is_finished_stays_when_somebody_stops() {
 
 fn frame(message: &Message) -> Vec<u8> {
     let mut room = [0; MESSAGE_BYTES_MAX];
-    let used = encode(message, &mut room, |body| body.fill(3)).unwrap();
+    let used = encode(0, message, &mut room, |body| body.fill(3)).unwrap();
     room[..used].to_vec()
 }
 

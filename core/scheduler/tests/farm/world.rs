@@ -128,7 +128,7 @@ impl Worker<'_, '_> {
                 Event::Frame { from, bytes } => {
                     let Ok(view) = decode(bytes) else { return };
                     if let Some(dispatcher) = dispatcher {
-                        dispatcher.handle(from, &view.message, now);
+                        dispatcher.handle(from, &view, now);
                     }
                     if let Message::Tiles { first, count, .. } = view.message
                         && !*stopped
@@ -270,7 +270,7 @@ fn host(
             Event::Frame { from, bytes } => match decode(bytes) {
                 Ok(view) => {
                     if let Some(dispatcher) = dispatcher {
-                        dispatcher.handle(from, &view.message, now);
+                        dispatcher.handle(from, &view, now);
                     }
                     master.handle(from, &view);
                 }
