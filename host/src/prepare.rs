@@ -7,7 +7,7 @@ use crate::model::{CameraSpec, Model, Objects, Settings};
 use crate::pack::{self, HybError, Packing};
 use hybray_scheduler::Step;
 use hybray_shading::{Filter, Light, LightKind, Map, MapTables, Maps, Material, spawn};
-use hybray_tracer::Scene;
+use hybray_tracer::{Layer, Scene};
 use hybray_wire::Frame;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -193,6 +193,8 @@ impl Prepared {
             magnitude: self.packed.magnitude,
             transmits: self.materials.iter().any(Material::transmits),
             texels: pages.texels(),
+            layer: Layer::Light,
+            eye: [0.0; 3],
         }
     }
 
@@ -218,7 +220,15 @@ impl Prepared {
             up: camera.up,
             fov_y_degrees: camera.fov_y_degrees,
             hither: camera.hither * scale,
+            layer: Layer::Light as u8,
+            half: 0,
         }
+    }
+
+    /// File units in an internal one.
+    #[must_use]
+    pub fn unit(&self) -> f32 {
+        libm::ldexpf(1.0, -self.packed.scale_log2)
     }
 
     /// What radiance is multiplied by before it is encoded.

@@ -79,8 +79,7 @@ pub enum FilmError {
 /// A picture that is coming together, in borrowed memory.
 pub struct Film<'m> {
     map: TileMap,
-    samples: u16,
-    seed: u64,
+    frame: Frame,
     step: Step,
     sums: &'m mut [[u64; 3]],
     tiles: &'m mut [TileState],
@@ -92,14 +91,14 @@ impl<'m> Film<'m> {
     /// pixel, `tiles` one a tile.
     #[must_use]
     pub fn new(frame: &Frame, sums: &'m mut [[u64; 3]], tiles: &'m mut [TileState]) -> Option<Self> {
-        let map = TileMap::new(frame.width, frame.height).filter(|_| frame.samples > 0)?;
+        let map = TileMap::new(frame.width, frame.height).filter(|_| frame.drawn_samples() > 0)?;
         if sums.len() != frame.width as usize * frame.height as usize || tiles.len() != map.len() as usize {
             return None;
         }
         sums.fill([0; 3]);
         tiles.fill(TileState::default());
         let step = Step::new(frame.step_log2);
-        Some(Self { map, samples: frame.samples, seed: frame.seed, step, sums, tiles, finished: 0 })
+        Some(Self { map, frame: *frame, step, sums, tiles, finished: 0 })
     }
 
     /// Where its tiles are.
@@ -214,8 +213,9 @@ impl<'m> Film<'m> {
         if self.tiles.get(tile as usize).is_none_or(|t| t.finished) {
             return;
         }
-        let (seed, samples) = (self.seed, u32::from(self.samples));
-        let ids = self.pixels(tile).flat_map(|pixel| (0..samples).map(move |s| id::primary_id(seed, pixel, s)));
+        let (seed, samples) = (self.frame.seed, self.frame.drawn());
+        let of_pixel = |pixel| samples.clone().map(move |s| id::primary_id(seed, pixel, u32::from(s)));
+        let ids = self.pixels(tile).flat_map(of_pixel);
         let balance = Balance::debit(ids);
         self.empty(tile);
         self.tiles[tile as usize] = TileState { balance, epoch, open: true, finished: false };
@@ -236,16 +236,22 @@ impl<'m> Film<'m> {
     /// Mean radiance of a pixel.
     #[must_use]
     pub fn radiance(&self, pixel: usize) -> [f32; 3] {
-        self.sums[pixel].map(|sum| self.step.mean(sum, self.samples))
+        self.sums[pixel].map(|sum| self.step.mean(sum, self.frame.drawn_samples()))
     }
 
     /// Hash of the accumulated picture, before anything is made of it: equal for equal pictures (FNV-1a over the sums,
     /// little-endian, row by row).
     #[must_use]
     pub fn hash(&self) -> u64 {
-        let bytes = self.sums.iter().flatten().flat_map(|sum| sum.to_le_bytes());
-        bytes.fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
+        hash_sums(self.sums)
     }
+}
+
+/// [`Film::hash`] of these sums: of those of two halves added up it is that of the whole.
+#[must_use]
+pub fn hash_sums(sums: &[[u64; 3]]) -> u64 {
+    let bytes = sums.iter().flatten().flat_map(|sum| sum.to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 #[cfg(test)]
@@ -286,6 +292,8 @@ mod tests {
             up: [0.0; 3],
             fov_y_degrees: 1.0,
             hither: 0.0,
+            layer: 0,
+            half: 0,
         };
         let (mut sums, mut tiles) = ([[0; 3]; 80], [TileState::default(); 2]);
         let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();

@@ -21,7 +21,7 @@ mod server;
 pub use chunk::{Shares, chunk};
 pub use clips::{Clipper, Unclipped};
 pub use dispatcher::{Dispatcher, NodeState, Options};
-pub use film::{Film, FilmError, Fixed, Step, TileState};
+pub use film::{Film, FilmError, Fixed, Step, TileState, hash_sums};
 pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
 pub use node::{

@@ -324,6 +324,8 @@ impl Plan {
             magnitude: scene.magnitude,
             transmits: scene.transmits,
             texels: &[],
+            layer: scene.layer,
+            eye: scene.eye,
         };
         Ok((memory, cache, scene))
     }

@@ -51,6 +51,8 @@ impl Picture {
             up: [0.0; 3],
             fov_y_degrees: 45.0,
             hither: 0.0,
+            layer: 0,
+            half: 0,
         };
         let sums = vec![[5; 3]; (width * height) as usize];
         Self { frame, map, sums, tiles: vec![TileState::default(); map.len() as usize] }

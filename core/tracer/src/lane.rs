@@ -1,6 +1,7 @@
 //! A lane: rays finished on the spot, depth first, in bounded memory, as far as the pages at hand go.
 
 use crate::hit::{HitRecord, Origin, detail, footprint_at, place};
+use crate::layer::Layer;
 use crate::scene::Scene;
 use crate::together::{self, Together};
 use bytemuck::Zeroable;
@@ -397,7 +398,10 @@ pub fn begin<S: Sink, P: Pages + ?Sized>(
 ) -> Result<Option<HitRecord>, RayRecord> {
     let origin = Origin::of(ray);
     if !hit.candidate.is_hit() {
-        let seen: [f32; 3] = core::array::from_fn(|c| ray.weight[c] * scene.background[c]);
+        let seen: [f32; 3] = match scene.layer {
+            Layer::Light => core::array::from_fn(|c| ray.weight[c] * scene.background[c]),
+            layer => layer.of_nothing(),
+        };
         add(sink, &origin, seen);
         sink.ended(&origin, ray.id.wrapping_neg());
         return Ok(None);
@@ -415,6 +419,12 @@ pub fn begin<S: Sink, P: Pages + ?Sized>(
         Some(Seen { look, emission, shading_normal }) => (Surface { shading_normal, ..surface }, look, emission),
     };
     counts.hits += 1;
+    if scene.layer != Layer::Light {
+        let material = scene.shading.materials.get(usize::from(surface.material)).map(|material| look.of(material));
+        add(sink, &origin, scene.layer.of(&surface, material.as_ref(), scene.eye));
+        sink.ended(&origin, ray.id.wrapping_neg());
+        return Ok(None);
+    }
     let facing = Facing::new(&surface, look);
     let weight = match ray.medium {
         0 => ray.weight,

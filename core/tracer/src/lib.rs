@@ -8,10 +8,12 @@
 
 mod hit;
 mod lane;
+mod layer;
 mod scene;
 mod together;
 
 pub use hit::{HitRecord, Origin, surface, surface_point};
 pub use lane::{Beyond, Lane, SHADOW_CHAIN_MAX, Sink, Walker, begin};
+pub use layer::Layer;
 pub use scene::Scene;
 pub use together::{TOGETHER, Together, goes_together};

@@ -1,5 +1,6 @@
 //! What a node knows of the scene.
 
+use crate::layer::Layer;
 use hybray_bintree::walk::Resident;
 use hybray_scene::{PageView, Pages, Texels};
 use hybray_shading as shading;
@@ -19,6 +20,10 @@ pub struct Scene<'a, P: Pages + ?Sized = [PageView<'a>]> {
     pub transmits: bool,
     /// Pages of texels, behind all others, for who has every page.
     pub texels: &'a [Texels<'a>],
+    /// What pictures show.
+    pub layer: Layer,
+    /// Where the distances of a layer of them are from.
+    pub eye: [f32; 3],
 }
 
 impl<P: Pages + ?Sized> Clone for Scene<'_, P> {
@@ -49,6 +54,8 @@ impl<'a, P: Pages + ?Sized> Scene<'a, P> {
             magnitude: self.magnitude,
             transmits: self.transmits,
             texels: self.texels,
+            layer: self.layer,
+            eye: self.eye,
         }
     }
 }

@@ -32,6 +32,35 @@ pub struct Frame {
     pub fov_y_degrees: f32,
     /// Distance along the view from which on something is seen.
     pub hither: f32,
+    /// What it shows: the number of a `Layer`, 0 for light.
+    pub layer: u8,
+    /// Which of the samples it has: 0 all, 1 those of even numbers, 2 those of odd ones.
+    pub half: u8,
+}
+
+impl Frame {
+    /// The first sample that it has, and how far it is from each to the next.
+    #[must_use]
+    pub const fn stride(&self) -> (u16, u16) {
+        match self.half {
+            0 => (0, 1),
+            1 => (0, 2),
+            _ => (1, 2),
+        }
+    }
+
+    /// Numbers of the samples that it has, of [`Frame::samples`].
+    pub fn drawn(&self) -> impl Iterator<Item = u16> + Clone + use<> {
+        let (first, step) = self.stride();
+        (first..self.samples).step_by(usize::from(step))
+    }
+
+    /// How many these are.
+    #[must_use]
+    pub const fn drawn_samples(&self) -> u16 {
+        let (first, step) = self.stride();
+        self.samples.saturating_sub(first).div_ceil(step)
+    }
 }
 
 /// What was traced, exactly: the same on any nodes.
@@ -349,6 +378,8 @@ mod tests {
         up: [0.0, 1.0, 0.0],
         fov_y_degrees: 45.0,
         hither: 0.0,
+        layer: 0,
+        half: 0,
     };
 
     fn check(message: Message) {

@@ -50,6 +50,7 @@ pub(super) struct FileHeader {
     pub kept: u32,
     pub width: u32,
     pub height: u32,
+    /// Of each pixel; above 16 bits of it what is drawn, and above another 8 which half of the samples.
     pub samples: u32,
     pub depth_max: u32,
     pub filter: u32,
@@ -79,7 +80,7 @@ impl FileHeader {
             kept: 0,
             width: f.width,
             height: f.height,
-            samples: f.samples.into(),
+            samples: u32::from(f.samples) | u32::from(f.layer) << 16 | u32::from(f.half) << 24,
             depth_max: f.depth_max.into(),
             filter: f.filter.into(),
             step_log2: f.step_log2.into(),
@@ -131,7 +132,9 @@ impl FileHeader {
         note(a.scene != b.scene, &|| "another scene".to_owned());
         let size = |h: &Self| [h.width, h.height];
         note(size(a) != size(b), &|| format!("--size {}x{} and not {}x{}", a.width, a.height, b.width, b.height));
-        note(a.samples != b.samples, &|| format!("--spp {} and not {}", a.samples, b.samples));
+        let spp = |h: &Self| h.samples & 0xffff;
+        note(spp(a) != spp(b), &|| format!("--spp {} and not {}", spp(a), spp(b)));
+        note(a.samples >> 16 != b.samples >> 16, &|| "another layer".to_owned());
         note(a.depth_max != b.depth_max, &|| format!("--depth {} and not {}", a.depth_max, b.depth_max));
         let cutoff = |h: &Self| h.weight_cutoff;
         note(cutoff(a).to_bits() != cutoff(b).to_bits(), &|| format!("--cutoff {} and not {}", cutoff(a), cutoff(b)));

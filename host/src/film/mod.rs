@@ -27,6 +27,15 @@ pub fn path_for(picture: &Path) -> Option<PathBuf> {
     })
 }
 
+/// The same for one of several pictures that go into one file: `a.exr.albedo.film`.
+#[must_use]
+pub fn path_for_part(picture: &Path, part: &str) -> Option<PathBuf> {
+    path_for(picture)?;
+    let mut name = OsString::from(picture);
+    name.push(format!(".{part}.film"));
+    Some(name.into())
+}
+
 /// Words of 64 bits that a bit for each tile takes.
 fn words_for(tiles: u32) -> usize {
     tiles.div_ceil(64) as usize

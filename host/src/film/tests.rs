@@ -25,6 +25,8 @@ const FRAME: Frame = Frame {
     up: [0.0, 1.0, 0.0],
     fov_y_degrees: 40.0,
     hither: 0.5,
+    layer: 0,
+    half: 0,
 };
 
 fn subject() -> Subject {

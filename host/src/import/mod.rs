@@ -29,6 +29,7 @@ pub use error::ImportError;
 pub use validate::{PRIMITIVES_MAX, SIZE_MAX, validate};
 
 pub(crate) use polygon::unit;
+pub(crate) use scene_toml::load_cameras;
 pub(crate) use validate::cone_bounds;
 
 use crate::builtin;

@@ -15,7 +15,7 @@ use super::transform::Transform;
 use super::{Format, MODELS, builtin_model, mtl, open, validate};
 use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
 use hybray_shading::{Highlight, Light, LightKind, Map, Maps, Material};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::ops::Range;
 use std::path::Path;
@@ -27,6 +27,54 @@ const FILE_BYTES_MAX: u64 = 1 << 24;
 
 /// Reads a scene file and what it includes.
 pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
+    let (text, file) = text_of(path)?;
+    read(&text, &file, path.parent().unwrap_or(Path::new("")))
+}
+
+/// Reads a file of `[[camera]]` tables alone. Each has a name of its own that can be part of a file's.
+///
+/// # Errors
+/// What is wrong, and where.
+pub(crate) fn load_cameras(path: &Path) -> Result<Vec<CameraSpec>, ImportError> {
+    let (text, file) = text_of(path)?;
+    read_cameras(&text, &file)
+}
+
+/// The same from text.
+pub(super) fn read_cameras(text: &str, file: &str) -> Result<Vec<CameraSpec>, ImportError> {
+    let source = Source { file, text };
+    let tables: CamerasFile = parse(&source, "see docs/SCENE.md for [[camera]] tables")?;
+    for table in &tables.camera {
+        let Some(name) = &table.get_ref().name else {
+            return Err(source.error(table.span(), "a camera has no `name`", "give one, for example name = \"front\""));
+        };
+        let plain = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+        if !name.get_ref().chars().all(plain) || name.get_ref().len() > NAME_BYTES_MAX {
+            let problem = format!("{} cannot be part of a file's name", quote(name.get_ref()));
+            let remedy = "use up to 100 letters, digits, dots, spaces, - and _";
+            return Err(source.error(name.span(), problem, remedy));
+        }
+    }
+    let builder = Builder::new(source, Path::new(""));
+    let cameras = builder.cameras(&tables.camera)?;
+    if cameras.is_empty() {
+        return Err(ImportError::new(file, "no cameras", "add a table [[camera]] with name, eye and target"));
+    }
+    Ok(cameras)
+}
+
+/// Bytes of a camera's name that goes into a file's.
+const NAME_BYTES_MAX: usize = 100;
+
+fn parse<T: serde::de::DeserializeOwned>(source: &Source<'_>, remedy: &str) -> Result<T, ImportError> {
+    toml::from_str(source.text).map_err(|error| match error.span() {
+        Some(span) => source.error(span, error.message().trim(), remedy),
+        None => ImportError::new(source.file, error.message().trim(), remedy),
+    })
+}
+
+/// A file's text, and what errors call it.
+fn text_of(path: &Path) -> Result<(String, String), ImportError> {
     let file = path.display().to_string();
     let reader = open(path).map_err(|e| e.into_error(&file))?;
     let mut bytes = Vec::new();
@@ -42,21 +90,14 @@ pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
         let line = error.as_bytes()[..good].iter().filter(|&&b| b == b'\n').count() as u64 + 1;
         ImportError::at(&file, line, "not UTF-8 text", "save the file as UTF-8")
     })?;
-    read(&text, &file, path.parent().unwrap_or(Path::new("")))
+    Ok((text, file))
 }
 
 /// The same from text; `folder` is where included files are looked for.
 pub(super) fn read(text: &str, file: &str, folder: &Path) -> Result<Model, ImportError> {
     let source = Source { file, text };
-    let scene: SceneFile = toml::from_str(text).map_err(|error| {
-        let remedy = "see docs/SCENE.md for what a scene file holds";
-        match error.span() {
-            Some(span) => source.error(span, error.message().trim(), remedy),
-            None => ImportError::new(file, error.message().trim(), remedy),
-        }
-    })?;
-    let mut builder =
-        Builder { source, folder, own: BTreeMap::new(), indices: BTreeMap::new(), model: Model::default() };
+    let scene: SceneFile = parse(&source, "see docs/SCENE.md for what a scene file holds")?;
+    let mut builder = Builder::new(source, folder);
     for (name, table) in &scene.material {
         let material = builder.material(table)?;
         builder.own.insert(name.clone(), material);
@@ -79,7 +120,11 @@ struct Builder<'a> {
     model: Model,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    fn new(source: Source<'a>, folder: &'a Path) -> Self {
+        Self { source, folder, own: BTreeMap::new(), indices: BTreeMap::new(), model: Model::default() }
+    }
+
     fn include(&mut self, table: &Spanned<IncludeTable>) -> Result<(), ImportError> {
         let (span, table) = (table.span(), table.get_ref());
         let file = self.source.needed(&table.file, "file", &span, "\"bunny.obj\"")?;
@@ -314,15 +359,7 @@ impl Builder<'_> {
 
     /// Cameras, lights, background and settings of this file, in place of the included ones.
     fn own_settings(&mut self, scene: &SceneFile) -> Result<(), ImportError> {
-        let mut cameras: Vec<CameraSpec> = Vec::new();
-        for table in &scene.camera {
-            let camera = self.camera(table, cameras.len())?;
-            if cameras.iter().any(|c| c.name == camera.name) {
-                let problem = format!("two cameras are called {}", quote(&camera.name));
-                return Err(self.source.error(table.span(), problem, "give each its own `name`"));
-            }
-            cameras.push(camera);
-        }
+        let cameras = self.cameras(&scene.camera)?;
         if !cameras.is_empty() {
             self.model.cameras = cameras;
         }
@@ -369,6 +406,20 @@ impl Builder<'_> {
             settings.seed = Some(source.whole(seed, "seed", 0..i64::MAX, "1")?);
         }
         Ok(())
+    }
+
+    fn cameras(&self, tables: &[Spanned<CameraTable>]) -> Result<Vec<CameraSpec>, ImportError> {
+        let mut names = BTreeSet::new();
+        let mut cameras = Vec::with_capacity(tables.len());
+        for table in tables {
+            let camera = self.camera(table, cameras.len())?;
+            if !names.insert(camera.name.clone()) {
+                let problem = format!("two cameras are called {}", quote(&camera.name));
+                return Err(self.source.error(table.span(), problem, "give each its own `name`"));
+            }
+            cameras.push(camera);
+        }
+        Ok(cameras)
     }
 
     fn camera(&self, table: &Spanned<CameraTable>, count: usize) -> Result<CameraSpec, ImportError> {

@@ -6,6 +6,7 @@
 mod compare;
 mod encode;
 mod flip;
+mod layers;
 mod output;
 pub(crate) mod pending;
 mod read;
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub use compare::{Difference, difference};
 pub use flip::{PIXELS_PER_DEGREE, flip};
+pub use layers::{Channel, Values};
 pub use output::Output;
 pub use read::read;
 pub use srgb::{decode_srgb, encode_srgb8, encode_srgb16};

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::pending::Pending;
-use super::{Format, Picture, PictureError, encode};
+use super::{Channel, Format, Picture, PictureError, encode, layers};
 
 /// A place for a picture. Dropped without [`Output::write`], it leaves nothing behind.
 #[derive(Debug)]
@@ -39,19 +39,44 @@ impl Output {
     /// [`PictureError::Size`] if the picture is empty or its values do not match its sides, [`PictureError::Write`] if
     /// the disk is full or the pipe closed. A file that was there is then as it was.
     pub fn write(self, picture: &Picture, exposure: f32) -> Result<(), PictureError> {
+        self.write_with(picture, exposure, &[])
+    }
+
+    /// The same with more `channels`, which EXR has and other formats leave out.
+    ///
+    /// # Errors
+    /// As [`Output::write`]; a channel has as many values as the picture has pixels.
+    pub fn write_with(self, picture: &Picture, exposure: f32, channels: &[Channel]) -> Result<(), PictureError> {
         picture.check()?;
+        let pixels = picture.rgb.len() / 3;
+        if let Some(channel) = channels.iter().find(|channel| channel.values.len() != pixels) {
+            let (width, height) = (picture.width, picture.height);
+            return Err(PictureError::Size { width, height, values: channel.values.len() });
+        }
         let Self { path, format, pending } = self;
         let result = match pending {
-            Some(pending) => write_file(pending, picture, exposure, format),
+            Some(pending) => write_file(pending, picture, exposure, format, channels),
             None => write_standard_output(picture, exposure, format),
         };
         result.map_err(|source| PictureError::Write { path, source })
     }
 }
 
-fn write_file(mut pending: Pending, picture: &Picture, exposure: f32, format: Format) -> io::Result<()> {
+fn write_file(
+    mut pending: Pending,
+    picture: &Picture,
+    exposure: f32,
+    format: Format,
+    channels: &[Channel],
+) -> io::Result<()> {
     let mut writer = BufWriter::new(pending.file()?);
-    encode::stream(picture, exposure, format, &mut writer)?;
+    if format == Format::Exr && !channels.is_empty() {
+        let mut bytes = io::Cursor::new(Vec::new());
+        layers::exr(picture, channels, &mut bytes)?;
+        writer.write_all(bytes.get_ref())?;
+    } else {
+        encode::stream(picture, exposure, format, &mut writer)?;
+    }
     writer.flush()?;
     drop(writer);
     pending.commit()

@@ -315,6 +315,13 @@ pub(super) struct RenderArgs {
     /// Which of the scene's cameras
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
+    /// Draw the views of all cameras of this file, one after the other on the same nodes: TOML with `[[camera]]` tables as in
+    /// scene files, each with a name. `out.png` becomes `out-NAME.png`
+    #[arg(long, value_name = "FILE", conflicts_with = "camera")]
+    pub cameras: Option<PathBuf>,
+    /// Channels to write beside red, green and blue, to an .exr
+    #[arg(long, value_enum, value_name = "LAYER,..", value_delimiter = ',')]
+    pub layers: Vec<LayerChoice>,
     /// Seed of every random choice
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -363,6 +370,25 @@ pub(super) struct RenderArgs {
     pub copies: CopyArgs,
     #[command(flatten)]
     pub tree: TreeArgs,
+}
+
+/// What may be written of a view beside its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum LayerChoice {
+    /// All of them
+    All,
+    /// Diffuse, mirrored and refracted share of what is seen first: albedo.R, .G, .B
+    Albedo,
+    /// Unit normal of what is seen first, towards the eye: normal.X, .Y, .Z
+    Normal,
+    /// Distance along the ray, file units: Z
+    Depth,
+    /// Number of the material plus 1: id
+    Id,
+    /// Samples that the pixel has: samples
+    Samples,
+    /// Estimated variance of the pixel: variance.R, .G, .B
+    Variance,
 }
 
 #[derive(Debug, Args)]

@@ -21,6 +21,8 @@ pub(super) struct Keeper<'a> {
     pub every: Duration,
     /// What was kept of it.
     pub kept: Option<Kept>,
+    /// It is kept when it is finished, too: others follow.
+    pub stays: bool,
     pub state: State,
 }
 
@@ -101,13 +103,13 @@ impl Watch for Keeper<'_> {
     fn end(&mut self, outcome: Outcome, film: &Film<'_>) {
         // What is on its way to the file is finished first, or given up: one writes at a time.
         if let Some((save, tiles)) = self.state.save.take() {
-            if outcome != Outcome::Finished {
+            if outcome != Outcome::Finished || self.stays {
                 self.state.saved(tiles, save.finish(film));
             } else if save.give_up().is_ok() {
                 self.state.in_file = Some(tiles);
             }
         }
-        if outcome != Outcome::Finished
+        if (outcome != Outcome::Finished || self.stays)
             && self.state.broken.is_none()
             && self.is_new(film)
             && let Some(path) = self.path
@@ -127,7 +129,7 @@ mod tests {
     use hybray_wire::Frame;
 
     /// A picture of two tiles, of which one is finished.
-    fn ended(outcome: Outcome, every: Duration, folder: &Scratch, path: &str) -> State {
+    fn ended(outcome: Outcome, every: Duration, stays: bool, folder: &Scratch, path: &str) -> State {
         let frame = Frame {
             width: 16,
             height: 8,
@@ -142,6 +144,8 @@ mod tests {
             up: [0.0; 3],
             fov_y_degrees: 1.0,
             hither: 0.0,
+            layer: 0,
+            half: 0,
         };
         let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
         let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();
@@ -152,6 +156,7 @@ mod tests {
             subject: &|| Subject { scene: 1, frame },
             every,
             kept: None,
+            stays,
             state: State::default(),
         };
         assert!(keeper.begin(&mut film));
@@ -166,14 +171,16 @@ mod tests {
         let folder = Scratch::new("keep");
         let hour = Duration::from_secs(3600);
         for outcome in [Outcome::Stopped, Outcome::Abandoned, Outcome::Missing { page: 1 }] {
-            let state = ended(outcome, hour, &folder, "film");
+            let state = ended(outcome, hour, false, &folder, "film");
             assert_eq!((state.in_file, folder.names()), (Some(1), vec!["film".to_owned()]), "{outcome:?}");
             std::fs::remove_file(folder.0.join("film")).unwrap();
         }
-        assert_eq!(ended(Outcome::Stopped, Duration::ZERO, &folder, "film").in_file, Some(1));
+        assert_eq!(ended(Outcome::Stopped, Duration::ZERO, false, &folder, "film").in_file, Some(1));
         std::fs::remove_file(folder.0.join("film")).unwrap();
-        assert_eq!(ended(Outcome::Finished, hour, &folder, "film").in_file, None);
-        let state = ended(Outcome::Abandoned, hour, &folder, "missing/film");
+        assert_eq!(ended(Outcome::Finished, hour, false, &folder, "film").in_file, None);
+        assert_eq!(ended(Outcome::Finished, hour, true, &folder, "film").in_file, Some(1), "others follow");
+        std::fs::remove_file(folder.0.join("film")).unwrap();
+        let state = ended(Outcome::Abandoned, hour, false, &folder, "missing/film");
         assert!(state.in_file.is_none() && state.trouble.is_some());
         assert!(folder.names().is_empty());
     }

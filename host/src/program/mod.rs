@@ -9,6 +9,7 @@ mod compare;
 mod convert;
 mod info;
 mod keep;
+mod layers;
 mod pack;
 mod plan;
 mod render;
@@ -16,6 +17,7 @@ mod report;
 mod show;
 mod simulate;
 mod trace;
+mod views;
 
 use anyhow::{Context, Result, anyhow, bail};
 use args::{Cli, SceneArgs, TreeArgs, Verb};

@@ -2,26 +2,30 @@
 
 use super::args::{RenderArgs, TreeArgs, When, Where};
 use super::budget::{Farm as BudgetFarm, size};
-use super::keep::{Keeper, State};
+use super::keep::State;
+use super::layers::{Drawing, Part};
 use super::report::{
-    Budget, Counts, Exchange, Memory, Node, PlanReport, Rays, Report, ReportFile, Seconds, peak_bytes,
+    Budget, Counts, Exchange, LayerReport, Memory, Node, PlanReport, Rays, Report, ReportFile, Seconds, peak_bytes,
 };
 use super::show::{Show, rays_per_second};
+use super::views::{Ended, Job, View, Views};
 use super::{End, camera, load, prepare};
-use crate::film::{FilmFileError, Kept, Subject, path_for};
-use crate::model::Settings;
+use crate::film::path_for;
+use crate::import::load_cameras;
+use crate::model::{CameraSpec, Settings};
 use crate::pack::is_packed;
 use crate::partition::{Fit, Pilot, page_bytes_for};
-use crate::picture::{Format, Output, Picture};
+use crate::picture::{Format, Output};
 use crate::prepare::Prepared;
 use crate::simulate::runs::name_of;
 use anyhow::{Context, Result, anyhow, bail};
-use hybray_native::{DispatcherAt, Farm, NODES_MAX, Traced, Worked, trace, trace_within};
+use hybray_native::{DispatcherAt, Farm, NODES_MAX, PICTURES_MAX, Traced, Worked, trace_all, trace_all_within};
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{NodeReport, Outcome, Settings as NodeSettings, Sizes};
 use hybray_shading::Camera;
 use hybray_wire::Frame;
+use std::cell::OnceCell;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,16 +38,26 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get().min(1024) as u16);
     let nodes = args.nodes.unwrap_or(cores);
     check_budget(args, nodes)?;
+    let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene, !args.layers.is_empty()));
+    let format = Format::of(&path, args.bits == "16")?;
+    check_layers(args, &path, format)?;
+    let cameras = args.cameras.as_deref().map(load_cameras).transpose()?;
+    if cameras.is_some() && path == Path::new("-") {
+        bail!("pictures of several cameras cannot all go to standard output: name a file with -o, such as -o out.png");
+    }
+    let named = |camera: &CameraSpec| View::named(&path, format, camera.clone());
+    let views: Option<Vec<View>> = cameras.map(|cameras| cameras.iter().map(named).collect());
     // What could go wrong at the end is tried at the beginning.
-    let path = args.output.clone().unwrap_or_else(|| default_output(&args.scene.scene));
-    let output = Output::create(&path, Format::of(&path, args.bits == "16")?)?;
+    match &views {
+        Some(views) => views.iter().try_for_each(|view| Output::create(&view.path, format).map(drop))?,
+        None => drop(Output::create(&path, format)?),
+    }
     let json = args.json.as_deref().map(ReportFile::create).transpose()?;
     if path == Path::new("-") && args.json.as_deref() == Some(Path::new("-")) {
         bail!("the picture and the report cannot both go to standard output: give one of them a file");
     }
 
-    let film = path_for(&path);
-    if args.resume && film.is_none() {
+    if args.resume && path_for(&path).is_none() {
         bail!("--resume goes on with what lies beside a picture's file, and this goes to no file: name one with -o");
     }
 
@@ -61,13 +75,18 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     } else {
         let (model, import_time) = load(&args.scene, args.size)?;
         say(&model.warnings, model.primitives() as u64);
-        camera(&model.cameras, args.camera.as_deref())?;
+        if views.is_none() {
+            camera(&model.cameras, args.camera.as_deref())?;
+        }
         if interrupted.load(Ordering::Relaxed) {
             return stopped_early(&show);
         }
         (Prepared::new(model, &args.tree.settings_with(page_bytes))?, import_time)
     };
-    let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
+    let views = match views {
+        Some(views) => views,
+        None => vec![View::one(&path, format, camera(&prepared.cameras, args.camera.as_deref())?)],
+    };
     if interrupted.load(Ordering::Relaxed) {
         return stopped_early(&show);
     }
@@ -80,8 +99,20 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         exposure: args.exposure,
         seed: args.seed,
     };
-    let frame = prepared.frame(&camera, &wanted);
-    check_camera(&frame)?;
+    let parts = Part::of(&args.layers);
+    let mut jobs = Vec::with_capacity(views.len() * parts.len());
+    for (number, view) in views.iter().enumerate() {
+        let frame = prepared.frame(&view.camera, &wanted);
+        check_camera(&frame)
+            .with_context(|| view.name.as_ref().map_or(String::new(), |name| format!("camera `{name}`")))?;
+        check_samples(args, &frame)?;
+        jobs.extend(Job::of(number, view, frame, &parts));
+    }
+    if jobs.len() > PICTURES_MAX {
+        bail!("{} pictures are more than the {PICTURES_MAX} of one run: give fewer cameras or layers", jobs.len());
+    }
+    let frames: Vec<Frame> = jobs.iter().map(|job| job.frame).collect();
+    let frame = frames[0];
     let exposure = prepared.exposure(&wanted);
     let policy = args.scheduler.unwrap_or_default();
     let settings = args.work.settings(NodeSettings { policy, ..NodeSettings::default() });
@@ -123,19 +154,31 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         grid = farm.grid(args.work.ways, &scene)?;
         show.line(&budget_line(fit, nodes, budget.memory, policy));
     }
-    let subject = || prepared.subject(&pages, &frame);
-    let kept = kept(args, film.as_deref(), &subject, &show)?;
-    let mut watch = Keeper {
+    let hash = OnceCell::new();
+    let scene_hash = || *hash.get_or_init(|| prepared.subject(&pages, &frame).scene);
+    let mut watch = Views {
         show: &mut show,
         interrupted: &interrupted,
-        path: film.as_deref(),
-        subject: &subject,
+        views: &views,
+        jobs: &jobs,
+        scene: &scene_hash,
         every: Duration::from_secs(args.save_every.into()),
-        kept,
+        resume: args.resume,
+        exposure,
+        at: 0,
         state: State::default(),
+        kept: None,
+        drawing: Drawing::of(&args.layers, prepared.unit()),
+        ended: Vec::with_capacity(jobs.len()),
+        unwritten: None,
     };
+    watch.kept = watch.open(&jobs[0])?;
+    if args.resume {
+        // What is wrong with any of them is told before anything is drawn.
+        jobs[1..].iter().try_for_each(|job| watch.open(job).map(drop))?;
+    }
     let traced = match args.memory.zip(fit.as_ref()) {
-        None => trace(&scene, prepared.hash, &frame, &farm, &mut watch),
+        None => trace_all(&scene, prepared.hash, &frames, &farm, &mut watch),
         Some((memory, fit)) => {
             let pages = prepared.packed.page_slices();
             let budget = hybray_native::Budget {
@@ -147,18 +190,22 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
                 settings: NodeSettings { grid, ..settings },
                 barred: &barred,
             };
-            trace_within(&scene, prepared.hash, &frame, &farm, &budget, &mut watch)?
+            trace_all_within(&scene, prepared.hash, &frames, &farm, &budget, &mut watch)?
         }
     };
-    let mut traced = traced.context("the picture has no pixels, or too many: give --size, such as 640x480")?;
-    let trace_time = traced.time;
-    let State { there, broken, trouble, in_file, .. } = watch.state;
-    if let Some(broken) = broken {
+    let traced = traced.context("the picture has no pixels, or too many: give --size, such as 640x480")?;
+    let films: Vec<PathBuf> = watch.films().map(Path::to_owned).collect();
+    let Views { mut ended, unwritten, .. } = watch;
+    if let Some(broken) = ended.iter_mut().find_map(|ended| ended.broken.take()) {
         return Err(broken.into());
     }
-    let film = film.filter(|_| in_file.is_some());
-    if let (Some(trouble), Some(path)) = (&trouble, path_for(&path)) {
-        show.line(&format!("warning: the film could not be kept in {}: {trouble}", path.display()));
+    if let Some(unwritten) = unwritten {
+        return Err(unwritten.into());
+    }
+    for (job, ended) in jobs.iter().zip(&ended) {
+        if let (Some(trouble), Some(path)) = (&ended.trouble, &job.film) {
+            show.line(&format!("warning: the film could not be kept in {}: {trouble}", path.display()));
+        }
     }
     let budget = args.memory.zip(fit.as_ref()).map(|(memory, fit)| {
         let settings = fit.plan.settings(settings);
@@ -179,9 +226,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     });
     drop(pages);
 
-    let kept = |film: &PathBuf| format!("; what is finished is kept in {}: --resume goes on", film.display());
-    let goes_on = film.as_ref().map(kept).unwrap_or_default();
-    match traced.outcome {
+    let goes_on = match &films[..] {
+        [] => String::new(),
+        [film] => format!("; what is finished is kept in {}: --resume goes on", film.display()),
+        [.., film] => format!("; what is finished is kept in {} and others: --resume goes on", film.display()),
+    };
+    let outcome = traced.last().map_or(Outcome::Stopped, |last| last.outcome);
+    match outcome {
         Outcome::Finished | Outcome::Stopped => {}
         Outcome::Unbalanced { tile } => {
             bail!("tile {tile} lost a ray twice: please report this, with the scene{goes_on}")
@@ -190,64 +241,144 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         Outcome::Missing { page } => bail!("page {page} was lost with the node that had it: render again{goes_on}"),
         Outcome::Abandoned => bail!("every node was lost before the picture was finished{goes_on}"),
     }
-    let film_warnings: Vec<_> = film_warnings(&traced).collect();
-    prepared.warnings.extend_from_slice(&film_warnings);
-    let rays = total_rays(&traced);
-    output.write(&picture(&frame, std::mem::take(&mut traced.radiance)), exposure)?;
+    let drawn = Drawn::of(&jobs, &traced, &ended);
+    let trace_time: Duration = traced.iter().map(|one| one.time).sum();
     let seconds = [import_time, prepared.build_time, trace_time, start.elapsed()];
+    let mut reports = Vec::with_capacity(drawn.len());
+    for view in &drawn {
+        let report = report(args, &prepared, &farm, view, seconds);
+        let nodes = nodes_of(&view.light, fit.as_ref());
+        reports.push(Report { view: views[view.view].name.clone(), budget: budget.clone(), nodes, ..report });
+    }
     if let Some(json) = json {
-        let report = report(args, &prepared, &frame, &farm, (&traced, there), seconds);
-        json.write(&Report { budget, nodes: nodes_of(&traced, fit.as_ref()), ..report })?;
+        match &reports[..] {
+            [one] if args.cameras.is_none() => json.write(one)?,
+            all => json.write(&all)?,
+        }
     }
-    film_warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
-    show.line(&format!(
-        "{} x {}, {} sample{}: {rays} rays in {:.2} s, {}; import {:.2} s, build {:.2} s",
-        frame.width,
-        frame.height,
-        frame.samples,
-        if frame.samples == 1 { "" } else { "s" },
-        trace_time.as_secs_f64(),
-        rays_per_second(rays, trace_time),
-        import_time.as_secs_f64(),
-        prepared.build_time.as_secs_f64(),
-    ));
+    for warning in traced.iter().flat_map(film_warnings) {
+        show.line(&format!("warning: {warning}"));
+    }
+    for view in &drawn {
+        show.line(&view_line(&views[view.view], view));
+    }
+    let all = merged(&traced.iter().collect::<Vec<_>>());
+    show.line(&format!("import {:.2} s, build {:.2} s", import_time.as_secs_f64(), prepared.build_time.as_secs_f64()));
     if let Some((memory, fit)) = args.memory.zip(fit.as_ref()) {
-        show.line(&traffic_line(&traced, fit, memory));
+        show.line(&traffic_line(&all, fit, memory));
     }
-    if traced.outcome == Outcome::Stopped {
-        let done = traced.progress;
-        let (finished, tiles, path) = (done.finished, done.tiles, path.display());
-        show.line(&format!("interrupted: {finished} of {tiles} tiles are in {path}{goes_on}"));
+    if outcome == Outcome::Stopped {
+        let done = traced.last().map(|last| last.progress).unwrap_or_default();
+        let (finished, tiles) = (done.finished, done.tiles);
+        let path = views[jobs[traced.len() - 1].view].path.display();
+        let left = views.len() - 1 - jobs[traced.len() - 1].view;
+        let left = if left == 0 { String::new() } else { format!(", and {left} views were not begun") };
+        show.line(&format!("interrupted: {finished} of {tiles} tiles are in {path}{left}{goes_on}"));
         return Ok(End::Interrupted);
     }
-    if let Some(film) = &film {
-        remove(film)?;
+    films.iter().try_for_each(|film| remove(film))?;
+    if let [view] = &views[..] {
+        show.line(&format!("{}", view.path.display()));
     }
-    show.line(&format!("{}", path.display()));
     Ok(End::Done)
 }
 
-/// What there is of the picture, if it is to go on.
-fn kept(
-    args: &RenderArgs,
-    film: Option<&Path>,
-    subject: &dyn Fn() -> Subject,
-    show: &Show,
-) -> Result<Option<Kept>, FilmFileError> {
-    let Some(path) = film else { return Ok(None) };
-    let name = path.display();
-    if !args.resume {
-        if path.exists() {
-            show.line(&format!("{name} has tiles of a picture that ended early: --resume would go on with it"));
+/// What was drawn of a view.
+struct Drawn<'a> {
+    view: usize,
+    frame: Frame,
+    /// Its light, in one piece or two.
+    light: Traced,
+    /// Tiles of it that were there.
+    there: u32,
+    layers: Vec<(&'static str, &'a Traced)>,
+}
+
+impl<'a> Drawn<'a> {
+    /// Of all views that were begun.
+    fn of(jobs: &[Job], traced: &'a [Traced], ended: &[Ended]) -> Vec<Self> {
+        let all: Vec<_> =
+            jobs.iter().zip(traced).zip(ended).map(|((job, traced), ended)| (job, traced, ended)).collect();
+        let views = all.chunk_by(|a, b| a.0.view == b.0.view);
+        let drawn = views.map(|parts| {
+            let light: Vec<_> = parts.iter().filter(|part| part.0.part.is_light()).collect();
+            let film = light.iter().rev().find_map(|part| part.2.light);
+            let mut merged = merged(&light.iter().map(|part| part.1).collect::<Vec<_>>());
+            merged.film = film.unwrap_or(merged.film);
+            Self {
+                view: parts[0].0.view,
+                frame: parts[0].0.frame,
+                light: merged,
+                there: light.iter().map(|part| part.2.there).sum(),
+                layers: parts
+                    .iter()
+                    .filter(|part| !part.0.part.is_light())
+                    .filter_map(|part| Some((part.0.part.name()?, part.1)))
+                    .collect(),
+            }
+        });
+        drawn.collect()
+    }
+}
+
+/// Several pictures as one: what was done for them together, and how the last ended.
+fn merged(all: &[&Traced]) -> Traced {
+    let last = all[all.len() - 1];
+    let mut nodes = last.nodes.clone();
+    let mut worked = last.worked.clone();
+    for one in &all[..all.len() - 1] {
+        for (sum, node) in nodes.iter_mut().zip(&one.nodes) {
+            sum.counts += node.counts;
+            sum.tiles += node.tiles;
+            sum.runs += node.runs;
+            sum.busy_nanoseconds += node.busy_nanoseconds;
         }
-        return Ok(None);
+        worked.iter_mut().zip(&one.worked).for_each(|(sum, node)| *sum += *node);
     }
-    let kept = Kept::open(path, &subject())?;
-    match &kept {
-        Some(kept) => show.line(&format!("{name}: {} tiles are there", kept.tiles())),
-        None => show.line(&format!("there is no {name}: the picture begins from the start")),
+    let mut walks = hybray_bintree::walk::Counts::default();
+    all.iter().for_each(|one| walks += one.walks);
+    Traced {
+        outcome: last.outcome,
+        time: all.iter().map(|one| one.time).sum(),
+        radiance: Vec::new(),
+        film: last.film,
+        progress: last.progress,
+        nodes,
+        walks,
+        worked,
+        refused_frames: all.iter().map(|one| one.refused_frames).sum(),
     }
-    Ok(kept)
+}
+
+fn view_line(view: &View, drawn: &Drawn<'_>) -> String {
+    let Frame { width, height, samples, .. } = drawn.frame;
+    let name = view.name.as_ref().map_or(String::new(), |name| format!("{name}: "));
+    let s = if samples == 1 { "" } else { "s" };
+    let (rays, time) = (total_rays(&drawn.light), drawn.light.time);
+    let layers: Duration = drawn.layers.iter().map(|(_, layer)| layer.time).sum();
+    let layers = match drawn.layers.len() {
+        0 => String::new(),
+        _ => format!("; layers {:.2} s", layers.as_secs_f64()),
+    };
+    let (seconds, rate) = (time.as_secs_f64(), rays_per_second(rays, time));
+    format!("{name}{width} x {height}, {samples} sample{s}: {rays} rays in {seconds:.2} s, {rate}{layers}")
+}
+
+/// Layers want a place for them.
+fn check_layers(args: &RenderArgs, path: &Path, format: Format) -> Result<()> {
+    if !args.layers.is_empty() && format != Format::Exr {
+        let path = path.display();
+        bail!("`{path}` has no room for layers: name an EXR with -o, such as -o out.exr, or leave --layers out");
+    }
+    Ok(())
+}
+
+/// Variance wants something to vary.
+fn check_samples(args: &RenderArgs, frame: &Frame) -> Result<()> {
+    if Part::of(&args.layers).contains(&Part::Odd) && frame.samples < 2 {
+        bail!("the variance of one sample a pixel is not known: give --spp 2, or more, or name other --layers");
+    }
+    Ok(())
 }
 
 /// Removes a film whose picture is written.
@@ -311,10 +442,11 @@ fn nodes_of(traced: &Traced, fit: Option<&Fit>) -> Vec<Node> {
     nodes.map(node).collect()
 }
 
-/// `spd:balls:4` becomes `spd-balls-4.png`, `models/cow.obj` becomes `cow.png`, in this folder.
-fn default_output(scene: &str) -> PathBuf {
+/// `spd:balls:4` becomes `spd-balls-4.png`, `models/cow.obj` becomes `cow.png`, in this folder; an .exr if it has layers.
+fn default_output(scene: &str, layers: bool) -> PathBuf {
+    let extension = if layers { "exr" } else { "png" };
     let stem = Path::new(scene).file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy().into_owned());
-    PathBuf::from(format!("{}.png", stem.replace(':', "-")))
+    PathBuf::from(format!("{}.{extension}", stem.replace(':', "-")))
 }
 
 /// True from the first Ctrl-C on; a second one ends the program at once.
@@ -344,10 +476,6 @@ fn stopped_early(show: &Show) -> Result<End> {
     Ok(End::Interrupted)
 }
 
-fn picture(frame: &Frame, radiance: Vec<[f32; 3]>) -> Picture {
-    Picture { width: frame.width, height: frame.height, rgb: radiance.into_flattened() }
-}
-
 fn film_warnings(traced: &Traced) -> impl Iterator<Item = String> + use<> {
     let sum = |f: fn(&hybray_wire::Counts) -> u64| traced.nodes.iter().map(|n| f(&n.counts)).sum::<u64>();
     let (refused, clamped) = (sum(|c| c.refused), sum(|c| c.clamped));
@@ -368,18 +496,32 @@ fn total_rays(traced: &Traced) -> u64 {
 fn report(
     args: &RenderArgs,
     prepared: &Prepared,
-    frame: &Frame,
     farm: &Farm,
-    (traced, tiles_kept): (&Traced, u32),
+    drawn: &Drawn<'_>,
     [import, build, trace, total]: [Duration; 4],
 ) -> Report {
+    let Drawn { frame, light: traced, there: tiles_kept, .. } = drawn;
+    let trace = if args.cameras.is_some() { traced.time } else { trace };
+    let layers = drawn.layers.iter().map(|&(layer, traced)| {
+        let sum = |f: fn(&hybray_wire::Counts) -> u64| traced.nodes.iter().map(|node| f(&node.counts)).sum();
+        LayerReport {
+            layer,
+            film: format!("{:016x}", traced.film),
+            seconds: traced.time.as_secs_f64(),
+            primary: sum(|counts| counts.primary),
+            hits: sum(|counts| counts.hits),
+        }
+    });
     let mut counts = hybray_wire::Counts::default();
     traced.nodes.iter().for_each(|node| counts += node.counts);
     let [triangles, spheres, cones] = prepared.primitives;
     let [lights, materials] = prepared.tables().map(|n| n as u64);
     let peak_bytes = peak_bytes();
     let primitives = (triangles + spheres + cones).max(1);
+    let warnings = prepared.warnings.iter().cloned().chain(film_warnings(traced));
     Report {
+        view: None,
+        layers: layers.collect(),
         scene: args.scene.scene.clone(),
         width: frame.width,
         height: frame.height,
@@ -401,7 +543,7 @@ fn report(
             materials,
             pages: prepared.packed.pages() as u64,
             tiles: traced.progress.tiles,
-            tiles_kept,
+            tiles_kept: *tiles_kept,
             hits: counts.hits,
             contributions: counts.contributions,
             refused: counts.refused,
@@ -420,6 +562,6 @@ fn report(
         budget: None,
         kernels: farm.kernels.name(),
         nodes: Vec::new(),
-        warnings: prepared.warnings.clone(),
+        warnings: warnings.collect(),
     }
 }

@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 pub(super) struct Report {
     /// What was drawn.
     pub scene: String,
+    /// Name of its camera, where there are several views.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<String>,
     pub width: u32,
     pub height: u32,
     pub samples: u16,
@@ -34,7 +37,22 @@ pub(super) struct Report {
     pub kernels: &'static str,
     /// The work of each node.
     pub nodes: Vec<Node>,
+    /// Layers that rays were traced for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerReport>,
     pub warnings: Vec<String>,
+}
+
+/// A layer of the view.
+#[derive(Debug, Serialize)]
+pub(super) struct LayerReport {
+    pub layer: &'static str,
+    /// Hash of its film.
+    pub film: String,
+    pub seconds: f64,
+    /// Its rays, and those that hit something.
+    pub primary: u64,
+    pub hits: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -97,7 +115,7 @@ pub(super) struct Node {
 }
 
 /// What each node was given, and how it worked.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct Budget {
     /// Of each node, bytes.
     pub memory: u64,
@@ -117,7 +135,7 @@ pub(super) struct Budget {
 }
 
 /// What each node's memory is spent on.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct PlanReport {
     pub terms: Vec<Term>,
     pub total_bytes: u64,
@@ -140,7 +158,7 @@ pub(super) struct PlanReport {
 }
 
 /// What nodes have of others' pages towards the lights.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct LightCachesReport {
     /// Lights that pages are kept for: all, or 0 if there are no light caches.
     pub lights: usize,
@@ -152,7 +170,7 @@ pub(super) struct LightCachesReport {
     pub bytes: u64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct Term {
     pub name: &'static str,
     pub count: u64,

@@ -292,6 +292,15 @@ pub struct Worked {
     pub high_water: HighWater,
 }
 
+impl core::ops::AddAssign for Worked {
+    /// What was done for one picture and a later one.
+    fn add_assign(&mut self, b: Self) {
+        self.walks += b.walks;
+        self.traffic += b.traffic;
+        self.high_water = b.high_water;
+    }
+}
+
 impl Worked {
     /// What came since `before`.
     fn since(self, before: &Self) -> Self {

@@ -6,7 +6,7 @@ use hybray_geometry::{Aabb, Vec3};
 use hybray_native::{DispatcherAt, Farm, Traced, trace};
 use hybray_scene::{Child, Directory, Node, PageEntry};
 use hybray_scheduler::{Options, Outcome, Progress};
-use hybray_tracer::Scene;
+use hybray_tracer::{Layer, Scene};
 use hybray_wire::Frame;
 use std::sync::mpsc::channel;
 use std::thread;
@@ -26,6 +26,8 @@ const FRAME: Frame = Frame {
     up: [0.0, 1.0, 0.0],
     fov_y_degrees: 40.0,
     hither: 0.0,
+    layer: 0,
+    half: 0,
 };
 
 /// A scene of these directory nodes, without pages.
@@ -46,6 +48,8 @@ fn scene<'a>(nodes: &'a [Node], entries: &'a [PageEntry]) -> Scene<'a> {
         magnitude: 1.0,
         transmits: false,
         texels: &[],
+        layer: Layer::Light,
+        eye: [0.0; 3],
     }
 }
 

@@ -5,6 +5,7 @@ use hybray_bintree::walk::Resident;
 use hybray_link::HOST;
 use hybray_scene::Directory;
 use hybray_scheduler::policy::Policy;
+use hybray_tracer::Layer;
 
 const FRAME: Frame = Frame {
     width: 150,
@@ -20,6 +21,8 @@ const FRAME: Frame = Frame {
     up: [0.0, 1.0, 0.0],
     fov_y_degrees: 40.0,
     hither: 0.0,
+    layer: 0,
+    half: 0,
 };
 
 fn sky() -> Scene<'static> {
@@ -39,6 +42,8 @@ fn sky() -> Scene<'static> {
         magnitude: 1.0,
         transmits: false,
         texels: &[],
+        layer: Layer::Light,
+        eye: [0.0; 3],
     }
 }
 

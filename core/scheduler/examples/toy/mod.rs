@@ -4,7 +4,7 @@ use hybray_bintree::{BinaryNode, Forest, Item, cut, sah, top};
 use hybray_geometry::{Aabb, Cone, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Kind, Line, Node, PageEntry, PageView, Tables};
 use hybray_shading::{Highlight, Light, LightKind, Material, spawn};
-use hybray_tracer::Scene;
+use hybray_tracer::{Layer, Scene};
 use hybray_wire::Frame;
 
 /// Names the scene to those who trace it. It is made in this file, so any number does.
@@ -132,6 +132,8 @@ impl Toy {
             magnitude: 100.0,
             transmits: true,
             texels: &[],
+            layer: Layer::Light,
+            eye: [0.0; 3],
         }
     }
 
@@ -151,6 +153,8 @@ impl Toy {
             up: [0.0, 1.0, 0.0],
             fov_y_degrees: 26.0,
             hither: 0.0,
+            layer: 0,
+            half: 0,
         }
     }
 }

@@ -48,6 +48,8 @@ const FRAME: Frame = Frame {
     up: [0.0; 3],
     fov_y_degrees: 1.0,
     hither: 0.0,
+    layer: 0,
+    half: 0,
 };
 
 fn say(master: &mut Master<'_>, from: Peer, message: Message) {

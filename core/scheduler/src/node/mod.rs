@@ -127,6 +127,17 @@ pub struct Traffic {
     pub nonsense: u64,
 }
 
+impl core::ops::AddAssign for Traffic {
+    fn add_assign(&mut self, b: Self) {
+        self.arrived += b.arrived;
+        self.forwarded += b.forwarded;
+        self.refused += b.refused;
+        self.fetched += b.fetched;
+        self.served += b.served;
+        self.nonsense += b.nonsense;
+    }
+}
+
 impl core::ops::Sub for Traffic {
     type Output = Self;
 
@@ -416,7 +427,8 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     /// Begins a picture, and counts anew.
     fn begin(&mut self, frame: Frame) {
         self.picture = Picture::new(frame);
-        if let Some(Picture { frame, .. }) = &self.picture {
+        if let Some(Picture { frame, layer, .. }) = &self.picture {
+            (self.scene.layer, self.scene.eye) = (*layer, frame.eye);
             self.scene.shading.ray_depth_max = u32::from(frame.depth_max);
             self.scene.shading.weight_cutoff = frame.weight_cutoff;
         }
@@ -518,6 +530,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     fn work(&mut self, now: u64) -> bool {
         let Some(picture) = &self.picture else { return false };
         let frame = &picture.frame;
+        let (first_sample, step) = frame.stride();
         let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, peers, .. } = &mut self.memory;
         let Bundle { rays, walked, places, lit, together, stack } = &mut **bundle;
         let scene = self.scene.at_hand(&self.store);
@@ -645,19 +658,19 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     self.stage = Stage::Shading { sample, next: next + 1, end };
                 }
                 // Samples of one pixel draw on each other's pages; but one bundle a step is enough.
-                Stage::Shading { sample, .. } if sample + 1 < frame.samples => {
+                Stage::Shading { sample, .. } if frame.samples - sample > step => {
                     if bundles == 1 {
                         break;
                     }
                     bundles += 1;
                     let count = self.in_work.rays;
-                    start_sample(picture, sample + 1, &places[..count], &mut rays[..count]);
+                    start_sample(picture, sample + step, &places[..count], &mut rays[..count]);
                     match &way {
                         None => trace_bundle(&scene, &rays[..count], walked, &mut walker),
                         Some(_) => trace_bundle(&scene.at_hand(&Nothing), &rays[..count], walked, &mut walker),
                     }
                     counts.primary += count as u64;
-                    self.stage = Stage::Shading { sample: sample + 1, next: 0, end: count };
+                    self.stage = Stage::Shading { sample: sample + step, next: 0, end: count };
                 }
                 Stage::Shading { .. } => {
                     self.stage = Stage::Idle;
@@ -722,13 +735,13 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                             &mut walker.counts,
                         );
                     }
-                    start_sample(picture, 0, &places[..count], &mut rays[..count]);
+                    start_sample(picture, first_sample, &places[..count], &mut rays[..count]);
                     match &way {
                         None => trace_bundle(&scene, &rays[..count], walked, &mut walker),
                         Some(_) => trace_bundle(&scene.at_hand(&Nothing), &rays[..count], walked, &mut walker),
                     }
                     counts.primary += count as u64;
-                    self.stage = Stage::Shading { sample: 0, next: 0, end: count };
+                    self.stage = Stage::Shading { sample: first_sample, next: 0, end: count };
                 }
             }
         }

@@ -3,6 +3,7 @@
 use super::DEPTH_MAX;
 use crate::film::Step;
 use hybray_shading::{Camera, Filter};
+use hybray_tracer::Layer;
 use hybray_wire::{Frame, TileMap};
 
 /// What a node makes of a [`Frame`].
@@ -12,6 +13,7 @@ pub(crate) struct Picture {
     pub camera: Camera,
     pub filter: Filter,
     pub step: Step,
+    pub layer: Layer,
 }
 
 impl Picture {
@@ -25,18 +27,19 @@ impl Picture {
             frame.width,
             frame.height,
         );
-        let sound = frame.samples > 0 && (1..=DEPTH_MAX as u8).contains(&frame.depth_max);
+        let sound = frame.half <= 2 && frame.drawn_samples() > 0 && (1..=DEPTH_MAX as u8).contains(&frame.depth_max);
         Some(Self {
             frame,
             map: TileMap::new(frame.width, frame.height).filter(|_| sound)?,
             camera: camera.ok()?,
             filter: Filter::from_u32(u32::from(frame.filter))?,
             step: Step::new(frame.step_log2),
+            layer: Layer::from_u8(frame.layer)?,
         })
     }
 }
 
-/// Whether nodes can draw this picture: it has pixels, samples, a depth of 1 to 64, a filter, and a camera that looks
+/// Whether nodes can draw this picture: it has pixels, samples, a depth of 1 to 64, a filter, a layer, and a camera that looks
 /// somewhere. Ask before it begins: a node passes over what it cannot draw, and its tiles would be waited for.
 #[must_use]
 pub fn can_draw(frame: &Frame) -> bool {

@@ -57,9 +57,10 @@ impl OpenTile {
 
     /// Debits a tile's primaries and empties its sums.
     pub fn open(&mut self, frame: &Frame, map: &TileMap, tile: u32, epoch: u16) {
-        let (t, samples) = (map.tile(tile), u32::from(frame.samples));
+        let (t, samples) = (map.tile(tile), frame.drawn());
         let pixels = (t.y..t.y + t.height).flat_map(|y| (t.x..t.x + t.width).map(move |x| y * frame.width + x));
-        let ids = pixels.flat_map(|pixel| (0..samples).map(move |s| id::primary_id(frame.seed, pixel, s)));
+        let ids =
+            pixels.flat_map(|pixel| samples.clone().map(move |s| id::primary_id(frame.seed, pixel, u32::from(s))));
         *self = Self { tile, epoch, stage: Stage::Open, balance: Balance::debit(ids), ..Self::FREE };
     }
 

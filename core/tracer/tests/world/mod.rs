@@ -7,7 +7,7 @@ use hybray_bintree::{BinaryNode, Forest, Item, sah, top};
 use hybray_geometry::{Cone, Sphere, Triangle, Vec3};
 use hybray_scene::{Directory, Header, Kind, Node, PageEntry, PageView, Tables};
 use hybray_shading::{self as shading, Light, Material, spawn};
-use hybray_tracer::Scene;
+use hybray_tracer::{Layer, Scene};
 
 #[derive(Clone, Copy, Debug)]
 pub enum Shape {
@@ -111,6 +111,8 @@ impl World {
             magnitude,
             transmits: self.shapes.iter().any(|&(_, m)| self.materials[usize::from(m)].transmits()),
             texels: &[],
+            layer: Layer::Light,
+            eye: [0.0; 3],
         })
     }
 }

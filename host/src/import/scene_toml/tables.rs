@@ -26,6 +26,14 @@ pub(super) struct SceneFile {
     pub(super) triangle: Vec<Spanned<TriangleTable>>,
 }
 
+/// A file of cameras alone.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CamerasFile {
+    #[serde(default)]
+    pub(super) camera: Vec<Spanned<CameraTable>>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SettingsTable {
