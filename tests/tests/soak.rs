@@ -13,7 +13,7 @@ use hybray_scene::{PageForm, lines_for};
 use hybray_scheduler::policy::{Grid, LinkCost, Policy, Tiles};
 use hybray_scheduler::{Options, Outcome, Plan, PlanError, Settings};
 use hybray_simulated::{
-    Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_spoiled,
+    Budget, Farm, LinkModel, MACHINES, Machine, Network, NetworkModel, Simulated, Topology, simulate_run,
 };
 use hybray_tests::{Random, kernels, scene, within};
 use hybray_tracer::Scene;
@@ -25,6 +25,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const SEEDS: u64 = 300;
 /// Every so many seeds one is run twice.
 const TWICE: u64 = 10;
+/// Every so many seeds one is run with several pictures, too.
+const SEVERAL: u64 = 2;
 const NAMES: [&str; 7] =
     ["spd:balls:1", "spd:teapot:2", "cornell:mirror", "spd:gears:1", "spd:mount:2", "organic:400", "gallery:48"];
 const PAGE_BYTES: [usize; 3] = [1024, 4096, 16_384];
@@ -275,7 +277,7 @@ impl Draw {
         }
     }
 
-    fn run(&self, drawn: &Drawn, scene: &Scene<'_>, pages: &[&[u8]], frame: &Frame) -> Simulated {
+    fn run(&self, drawn: &Drawn, scene: &Scene<'_>, pages: &[&[u8]], frames: &[Frame]) -> Simulated {
         let budget = self.budget.as_ref().map(|given| Budget {
             memory: given.memory,
             page_memory: None,
@@ -297,9 +299,26 @@ impl Draw {
                 }
             }
         };
-        simulate_spoiled(scene, drawn.prepared.hash, pages, frame, &farm, spoil, &mut |_| true)
+        simulate_run(scene, drawn.prepared.hash, pages, frames, &farm, spoil, &mut |_| true)
             .unwrap_or_else(|e| panic!("{e}"))
     }
+}
+
+/// The same farm draws several pictures, one after the other: faults fall into any of them, or between two.
+fn several(seed: u64, drawn: &Drawn, draw: &Draw, scene: &Scene<'_>, pages: &[&[u8]]) {
+    let random = &mut Random(!seed);
+    let expected: Vec<_> = (0..2 + random.below(3)).map(|_| drawn.frames[random.below(SIZES.len())]).collect();
+    let frames: Vec<Frame> = expected.iter().map(|&(frame, ..)| frame).collect();
+    let run = draw.run(drawn, scene, pages, &frames);
+    let (last, before) = expected.split_last().expect("several");
+    let lost = draw.faults.iter().any(|fault| matches!(fault, Fault::Lose { .. }));
+    assert_eq!((run.outcome, run.film, run.refused_frames), (Outcome::Finished, last.1, 0), "the last of {frames:?}");
+    assert_eq!(run.before.len(), before.len());
+    for (picture, (_, film, counts)) in run.before.iter().zip(before) {
+        assert_eq!(picture.film, *film, "another picture among {frames:?}");
+        assert!(lost || picture.counts == Some(*counts), "{:?} and not {counts:?} among {frames:?}", picture.counts);
+    }
+    assert!(run.nodes.iter().all(|node| node.exchange.nonsense == 0));
 }
 
 /// Draws and runs one seed.
@@ -317,10 +336,13 @@ fn check(seed: u64, all: &[Drawn], closeness: &Closeness) {
     };
     let tried = catch_unwind(AssertUnwindSafe(|| {
         within(600, what, || {
-            let run = draw.run(drawn, &scene, &pages, &frame);
+            let run = draw.run(drawn, &scene, &pages, &[frame]);
             expect(&run, &draw, film, &counts, closeness);
+            if seed % SEVERAL == 1 {
+                several(seed, drawn, &draw, &scene, &pages);
+            }
             if seed.is_multiple_of(TWICE) {
-                let again = draw.run(drawn, &scene, &pages, &frame);
+                let again = draw.run(drawn, &scene, &pages, &[frame]);
                 assert_eq!((again.events, again.film), (run.events, run.film), "another time another history");
                 assert_eq!(again.nodes, run.nodes, "another time another history");
             }

@@ -149,6 +149,12 @@ impl<'m> Master<'m> {
         &mut self.film
     }
 
+    /// Gives up what is known of the nodes, for the master of the next picture.
+    #[must_use]
+    pub fn release(&mut self) -> &'m mut [NodeReport] {
+        core::mem::take(&mut self.nodes)
+    }
+
     /// What each peer reported; the host's is empty.
     #[must_use]
     pub fn reports(&self) -> &[NodeReport] {

@@ -15,6 +15,8 @@ use toy::{SCENE_HASH, Toy};
 #[derive(Default)]
 struct Sent {
     taken: Vec<(Peer, Message)>,
+    /// About which pictures.
+    pictures: Vec<u16>,
     /// Times that there is no room for tiles that go back.
     refused: usize,
 }
@@ -29,12 +31,13 @@ impl Link for Sent {
     fn send(&mut self, to: Peer, bytes_max: usize, write: &mut dyn FnMut(&mut [u8]) -> usize) -> bool {
         let mut room = vec![0; bytes_max];
         let bytes = write(&mut room);
-        let message = decode(&room[..bytes]).expect("a node makes sense").message;
+        let View { picture, message, .. } = decode(&room[..bytes]).expect("a node makes sense");
         if matches!(message, Message::Back { .. }) && self.refused > 0 {
             self.refused -= 1;
             return false;
         }
         self.taken.push((to, message));
+        self.pictures.push(picture);
         true
     }
     fn receive(&mut self, _: &mut dyn FnMut(Event<'_>)) -> bool {
@@ -157,4 +160,68 @@ fn a_bundle_waits_for_its_cliplist() {
     assert_eq!(traced(0, &[&from(1), &from(HOST)]), [0, 0, 64]);
     assert_eq!(traced(1, &[&from(HOST), &from(1)]), [0, 0, 64]);
     assert_eq!(traced(1, &[&|node| node.lost(1)]), [0, 64]);
+}
+
+/// What node 1 says when it has ended picture 0 and begun picture 1, and hears `message` about `picture`.
+fn said_later(from: Peer, picture: u16, message: Message) -> Vec<(Peer, Message)> {
+    let toy = Toy::new();
+    let pages = toy.open();
+    let limits = Limits { peers: 3, pages: 1, rays: 8, tiles: 4, partials: 4 };
+    let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
+    let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
+    let (scene, settings) = (toy.scene(&pages), Settings::default());
+    let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
+    let mut link = Sent::default();
+    let hear = |node: &mut Node<'_, '_, All<'_>>, from, picture, message: Message| {
+        node.handle(from, &View { picture, message, body: &vec![0; message.body_bytes()] });
+    };
+    let begin = Message::Begin(Toy::frame(16, 8, 1));
+    let is_report = |sent: &(Peer, Message)| matches!(sent, (HOST, Message::Report { .. }));
+    hear(&mut node, HOST, 0, begin);
+    hear(&mut node, HOST, 0, Message::Tiles { first: 0, count: 2, epoch: 0 });
+    node.step(&mut || 0);
+    // What does not come from the host, or of another picture, ends nothing.
+    [(2, 0), (HOST, 1)].iter().for_each(|&(from, picture)| hear(&mut node, from, picture, Message::End));
+    assert_eq!(node.picture(), 0);
+    hear(&mut node, HOST, 0, Message::End);
+    assert_eq!(node.picture(), 1);
+    assert!(!node.step(&mut || 0), "nothing is left to do");
+    node.poll(&mut link, 1);
+    assert!(link.taken.iter().any(is_report) && link.pictures.contains(&0), "{:?}", link.taken);
+    assert!(!link.taken.iter().any(|sent| matches!(sent.1, Message::Contributions { .. })), "what it had is given up");
+    // Between two pictures there is room for nothing.
+    hear(&mut node, 2, 1, Message::Rays { rays: 1, shadows: 0, load: 0 });
+    hear(&mut node, HOST, 0, begin);
+    assert!(!node.step(&mut || 0));
+    (link.taken, link.pictures) = (Vec::new(), Vec::new());
+    node.poll(&mut link, 2);
+    assert_eq!(link.taken, [(2, Message::Took { taken: false, load: 0 }), (HOST, Message::Idle { given: true })]);
+    hear(&mut node, HOST, 1, begin);
+    node.poll(&mut link, 3);
+    assert!(matches!(link.taken.last(), Some((HOST, Message::Hello { .. }))), "{:?}", link.taken);
+    link.taken.clear();
+    hear(&mut node, from, picture, message);
+    for now in 4..8 {
+        node.step(&mut || 0);
+        node.poll(&mut link, now);
+    }
+    assert!(link.pictures.iter().all(|&picture| picture == 1), "{:?}", link.pictures);
+    link.taken
+}
+
+#[test]
+fn what_is_of_another_picture_is_not_heard() {
+    let all = [
+        (2, Message::Rays { rays: 9, shadows: 0, load: 0 }),
+        (2, Message::Rays { rays: 0, shadows: 0, load: 0 }),
+        (HOST, Message::Share { with: 2 }),
+        (HOST, Message::Tiles { first: 0, count: 2, epoch: 0 }),
+        (HOST, Message::Finished { tile: u32::MAX }),
+    ];
+    for (from, message) in all {
+        for picture in [0, 2, u16::MAX] {
+            assert_eq!(said_later(from, picture, message), [], "{message:?} of picture {picture}");
+        }
+        assert_ne!(said_later(from, 1, message), [], "{message:?}");
+    }
 }

@@ -339,7 +339,10 @@ pub fn encode(
 /// See [`WireError`].
 pub fn decode(bytes: &[u8]) -> Result<View<'_>, WireError> {
     let (picture, bytes) = match bytes {
-        [LATER, rest @ ..] => postcard::take_from_bytes::<u16>(rest).map_err(|_| WireError::Head)?,
+        [LATER, rest @ ..] => match postcard::take_from_bytes::<u16>(rest) {
+            Ok((picture, bytes)) if picture > 0 => (picture, bytes),
+            _ => return Err(WireError::Head),
+        },
         _ => (0, bytes),
     };
     let (message, body) = postcard::take_from_bytes::<Message>(bytes).map_err(|_| WireError::Head)?;
@@ -450,6 +453,7 @@ mod tests {
         assert_eq!(decode(&[200]), Err(WireError::Head));
         assert_eq!(decode(&[LATER]), Err(WireError::Head));
         assert_eq!(decode(&[LATER, 1]), Err(WireError::Head));
+        assert_eq!(decode(&[LATER, 0, 8]), Err(WireError::Head), "the first has no number");
         assert_eq!(decode(&[LATER, 1, LATER, 1, 8]), Err(WireError::Head), "a number is given once");
         assert_eq!(decode(&[LATER, 0xff, 0xff, 4, 8]), Err(WireError::Head), "a number of 17 bits");
     }

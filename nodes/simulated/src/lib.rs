@@ -30,7 +30,7 @@ use hybray_scheduler::{
     Progress, Settings, Sizes, TileState, Unclipped, bytes_of_copies, can_draw,
 };
 use hybray_tracer::Scene;
-use hybray_wire::{Frame, TileMap};
+use hybray_wire::{Counts, Frame, TileMap};
 
 /// Nodes at most.
 pub const NODES_MAX: Peer = 4096;
@@ -114,11 +114,22 @@ pub struct NodeRun {
     pub ended: u64,
 }
 
+/// What became of a picture that another followed: it was finished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// Hash of the accumulated picture.
+    pub film: u64,
+    /// What was traced for it; not known if some node was never heard of.
+    pub counts: Option<Counts>,
+}
+
 /// A picture, and what it took.
 #[derive(Clone, Debug)]
 pub struct Simulated {
     /// How it ended.
     pub outcome: Outcome,
+    /// Pictures that were drawn before it in the same run: times, bytes and operations are of all together.
+    pub before: Vec<Drawn>,
     /// Hash of the accumulated picture.
     pub film: u64,
     /// Hash of all deliveries: equal for equal histories.
@@ -202,16 +213,42 @@ pub fn simulate_spoiled(
     spoil: &mut dyn FnMut(&mut Network),
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Simulated, SimulateError> {
-    let map = TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame)).ok_or(SimulateError::NoPicture)?;
+    simulate_run(scene, scene_hash, pages, core::slice::from_ref(frame), farm, spoil, watch)
+}
+
+/// Draws pictures one after the other on the same nodes, as [`simulate_spoiled`] draws one: what it says is of the last, and
+/// what it took of all.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_run(
+    scene: &Scene<'_>,
+    scene_hash: u64,
+    pages: &[&[u8]],
+    frames: &[Frame],
+    farm: &Farm<'_>,
+    spoil: &mut dyn FnMut(&mut Network),
+    watch: &mut dyn FnMut(Progress) -> bool,
+) -> Result<Simulated, SimulateError> {
+    let drawable = |frame: &Frame| TileMap::new(frame.width, frame.height).filter(|_| can_draw(frame));
+    let maps: Option<Vec<TileMap>> = frames.iter().map(drawable).collect();
+    let maps = maps.filter(|maps| (1..=1 << 16).contains(&maps.len())).ok_or(SimulateError::NoPicture)?;
     if !(1..=NODES_MAX).contains(&farm.nodes) || farm.dispatcher > 1 {
         return Err(SimulateError::NoFarm);
     }
     let peers = usize::from(farm.nodes) + 1;
-    let mut sums = vec![[0; 3]; map.width() as usize * map.height() as usize];
-    let mut tiles = vec![TileState::default(); map.len() as usize];
+    let memory = |map: &TileMap| {
+        (vec![[0; 3]; map.width() as usize * map.height() as usize], vec![TileState::default(); map.len() as usize])
+    };
+    let mut films: Vec<_> = maps.iter().map(memory).collect();
     let mut reports = vec![NodeReport::default(); peers];
-    let film = Film::new(frame, &mut sums, &mut tiles).ok_or(SimulateError::NoPicture)?;
-    let master = Master::new(*frame, film, &mut reports, scene_hash, farm.dispatcher);
+    let films = frames.iter().zip(&mut films);
+    let films: Option<Vec<_>> =
+        films.map(|(frame, (sums, tiles))| Some((*frame, Film::new(frame, sums, tiles)?))).collect();
+    let mut films = films.ok_or(SimulateError::NoPicture)?;
+    let (frame, film) = films.remove(0);
+    let last = films.is_empty();
+    let master = Master::of_run(0, last, frame, film, &mut reports, scene_hash, farm.dispatcher);
     let mut states = vec![NodeState::default(); peers];
     let mut entries = scene.resident.directory.entries.to_vec();
     let mut scene = *scene;
@@ -244,10 +281,11 @@ pub fn simulate_spoiled(
     // Where there are no subhosts the host clips.
     let clipper =
         (settings.subhosts == Some(0)).then(|| Clipper::new(scene, Kernels::Portable, &mut unclipped, &mut clip_turns));
-    let mut world = world::World::new(farm, plan, master, &mut states, clipper, server, pages, workers);
+    let world = world::World::new(farm, plan, master, &mut states, clipper, server, pages, workers);
+    let mut world = world.followed_by(scene_hash, films);
     spoil(world.network());
     let delay_ns = world.network().delay_ns_max();
-    let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, frame, delay_ns);
+    let bound = Bound::new(&shared.scene, &plan, &settings, farm.machine, farm.nodes, &frame, delay_ns);
     Ok(Simulated { bound, ..world.run(watch)? })
 }
 

@@ -39,6 +39,8 @@ pub(crate) struct Shared<'s> {
 pub(crate) struct Worker<'s> {
     node: Node<'s, 's, Cache<'s, Charged<'s>>>,
     tiles: u64,
+    /// What it counted for pictures before this one.
+    before: hybray_wire::Counts,
 }
 
 impl<'s> Worker<'s> {
@@ -61,7 +63,7 @@ impl<'s> Worker<'s> {
         }
         let settings = plan.settings(settings);
         let node = Node::new(scene, cache, scene_hash, Kernels::Portable, me, dispatcher, settings, memory);
-        Self { node, tiles: 0 }
+        Self { node, tiles: 0, before: hybray_wire::Counts::default() }
     }
 
     /// Tiles of its own that are finished.
@@ -89,7 +91,12 @@ impl<'s> Worker<'s> {
         if let Message::Tiles { count, .. } = view.message {
             self.tiles += u64::from(count);
         }
+        let before = self.node.counts();
         self.node.handle(from, view);
+        // A node counts anew for each picture.
+        if self.node.counts() != before {
+            self.before += before;
+        }
     }
 
     /// A peer is gone.
@@ -110,7 +117,8 @@ impl<'s> Worker<'s> {
 
     /// What it has counted so far. Tiles are counted when they are given to it.
     pub fn operations(&self) -> Operations {
-        let (walks, counts) = (self.node.walk_counts(), self.node.counts());
+        let (walks, mut counts) = (self.node.walk_counts(), self.node.counts());
+        counts += self.before;
         Operations {
             hits: counts.hits,
             rays: counts.primary + counts.secondary + counts.shadow,

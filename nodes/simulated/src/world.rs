@@ -7,12 +7,12 @@ use crate::schedule::{Phase, Schedule};
 use crate::take::{Arrival, Taken, take};
 use crate::turn::{KINDS, Said, Turn};
 use crate::worker::{Worker, of_walks};
-use crate::{Bound, Farm, NodeRun, SimulateError, Simulated};
+use crate::{Bound, Drawn, Farm, NodeRun, SimulateError, Simulated};
 use hybray_link::{HOST, Peer};
 use hybray_scheduler::policy::Policy;
-use hybray_scheduler::{Clipper, Dispatcher, Master, NodeState, Outcome, PageServer, Plan, Progress};
+use hybray_scheduler::{Clipper, Dispatcher, Film, Master, NodeReport, NodeState, Outcome, PageServer, Plan, Progress};
 use hybray_sim::Network;
-use hybray_wire::Message;
+use hybray_wire::{Counts, Frame, Message};
 
 /// Virtual time in which nobody does anything, after which nobody ever will: far beyond any latency.
 const IDLE_NS_MAX: u64 = 100_000_000_000_000;
@@ -63,6 +63,10 @@ pub(crate) struct World<'a, 'm, 's> {
     done_ns: u64,
     /// Frames delivered and tiles finished when last something was traced or finished.
     progress: (u64, u32),
+    /// Pictures that follow, and what became of those before this one.
+    scene_hash: u64,
+    more: std::vec::IntoIter<(Frame, Film<'m>)>,
+    drawn: Vec<Drawn>,
 }
 
 impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
@@ -113,8 +117,16 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             gathered_ns: None,
             done_ns: 0,
             progress: (0, 0),
+            scene_hash: 0,
+            more: Vec::new().into_iter(),
+            drawn: Vec::new(),
             kinds: [(0, 0); KINDS.len()],
         }
+    }
+
+    /// Other pictures follow the first.
+    pub fn followed_by(self, scene_hash: u64, more: Vec<(Frame, Film<'m>)>) -> Self {
+        Self { scene_hash, more: more.into_iter(), ..self }
     }
 
     pub fn network(&mut self) -> &mut Network {
@@ -124,7 +136,9 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
     pub fn run(mut self, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Simulated, SimulateError> {
         loop {
             if let Some(outcome) = self.master.outcome() {
-                return Ok(self.end(outcome));
+                if outcome != Outcome::Finished || !self.next() {
+                    return Ok(self.end(outcome));
+                }
             }
             let turn = self.schedule.first();
             let turn_ns = turn.map_or(u64::MAX, |(time, _)| time);
@@ -151,6 +165,31 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
             }
             self.spread_news(now);
         }
+    }
+
+    /// Begins the next picture, if there is one.
+    fn next(&mut self) -> bool {
+        let Some((frame, film)) = self.more.next() else { return false };
+        let drawn = Drawn { film: self.master.film().hash(), counts: self.counts() };
+        self.drawn.push(drawn);
+        let Self { master, farm, .. } = self;
+        let (number, last) = (self.drawn.len() as u16, self.more.len() == 0);
+        let nodes = master.release();
+        *master = Master::of_run(number, last, frame, film, nodes, self.scene_hash, farm.dispatcher);
+        if farm.dispatcher == HOST {
+            self.dispatcher.next(number);
+        }
+        if let Some(clipper) = &mut self.clipper {
+            clipper.next(number);
+        }
+        true
+    }
+
+    /// What all nodes have reported of this picture; nothing if some are not known to.
+    fn counts(&self) -> Option<Counts> {
+        let mut counts = Counts::default();
+        self.master.reports()[1..].iter().for_each(|node| counts += node.counts);
+        self.master.reports()[1..].iter().all(NodeReport::is_known).then_some(counts)
     }
 
     fn spread_news(&mut self, now: u64) {
@@ -390,6 +429,7 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
         });
         Simulated {
             outcome,
+            before: self.drawn,
             film: self.master.film().hash(),
             events: network.log_hash(),
             loading_ns: first,

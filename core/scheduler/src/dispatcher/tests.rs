@@ -661,3 +661,32 @@ fn nobody_shares_if_that_is_off() {
         assert_eq!(wire.shared.len(), usize::from(take_over));
     }
 }
+
+#[test]
+fn each_picture_is_given_out_as_if_it_were_the_first() {
+    let (mut states, mut bits, mut wire) = (states(3), [0; 1], Wire::new());
+    let mut d = Dispatcher::new(&mut states, FIXED).keeping(&mut bits);
+    let hear =
+        |d: &mut Dispatcher<'_>, from, picture, message| d.handle(from, &View { picture, message, body: &[] }, 0);
+    hear(&mut d, HOST, 0, Message::Kept { first: 0, count: 4 });
+    hear(&mut d, HOST, 0, begin(12));
+    (1..4).for_each(|node| hear(&mut d, node, 0, HELLO));
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 4, 4, 0), (2, 8, 4, 0)]);
+    d.lost(2);
+    // Only the host ends a picture, and only this one.
+    [(1, 0), (HOST, 1)].iter().for_each(|&(from, picture)| hear(&mut d, from, picture, Message::End));
+    assert_eq!(d.picture, 0);
+    hear(&mut d, HOST, 0, Message::End);
+    // What is late: a node that is here no more, runs that nobody has, tiles that are kept of another picture.
+    let late = [HELLO, Message::Done { first: 4, count: 4, nanoseconds: 1 }, Message::Idle { given: false }];
+    late.iter().for_each(|&message| hear(&mut d, 1, 0, message));
+    hear(&mut d, HOST, 0, Message::Kept { first: 0, count: 12 });
+    hear(&mut d, HOST, 1, Message::Kept { first: 8, count: 1 });
+    hear(&mut d, HOST, 1, begin(12));
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [], "nobody has begun it");
+    [1, 2, 3].iter().for_each(|&node| hear(&mut d, node, 1, HELLO));
+    d.poll(&mut wire, 0);
+    assert_eq!(wire.take(), [(1, 0, 4, 0), (3, 4, 4, 0), (1, 9, 3, 0)], "node 2 stays lost");
+}

@@ -163,3 +163,66 @@ fn the_first_outcome_stays() {
         assert_eq!(master.outcome(), Some(Outcome::Stranger { peer: 2 }));
     });
 }
+
+/// The first of two pictures ends for a node when it has reported twice, and who was lost in it is lost in the second.
+#[test]
+fn another_picture_follows_when_all_have_ended_the_one_before() {
+    let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
+    let mut nodes = vec![NodeReport::default(); 4];
+    let mut film = Film::new(&FRAME, &mut sums, &mut tiles).unwrap();
+    [0, 1].iter().for_each(|&tile| film.keep(tile, &[1; 64 * 24]).unwrap());
+    let mut master = Master::of_run(0, false, FRAME, film, &mut nodes, 9, HOST);
+    let hello = Message::Hello { version: VERSION, scene: 9 };
+    // Node 2 says nothing for long: the last picture would not wait for it.
+    [1, 3].iter().for_each(|&node| say(&mut master, node, hello));
+    [1, 3].iter().for_each(|&node| report(&mut master, node));
+    assert_eq!((master.outcome(), master.stopping), (None, None));
+    say(&mut master, 2, hello);
+    report(&mut master, 2);
+    let mut wire = Wire(Vec::new(), usize::MAX);
+    master.poll(&mut wire);
+    let ends: Vec<_> = wire.0.iter().filter(|sent| sent.1 == Message::End).map(|sent| sent.0).collect();
+    assert_eq!(ends, [1, 2, 3]);
+    assert!(!wire.0.iter().any(|sent| sent.1 == Message::Stop));
+    [1, 2].iter().for_each(|&node| report(&mut master, node));
+    assert_eq!(master.outcome(), None, "node 3 may still be at it");
+    master.lost(3);
+    assert_eq!(master.outcome(), Some(Outcome::Finished));
+
+    let nodes = master.release();
+    let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
+    let film = Film::new(&FRAME, &mut sums, &mut tiles).unwrap();
+    let mut master = Master::of_run(1, true, FRAME, film, nodes, 9, HOST);
+    let mut wire = Wire(Vec::new(), usize::MAX);
+    master.poll(&mut wire);
+    assert_eq!(wire.0.iter().map(|sent| sent.0).collect::<Vec<_>>(), [1, 2, HOST]);
+    // A tile of the picture before is none of this one, nor is a report; and neither is an error.
+    let contributions = Message::Contributions { tile: 0, epoch: 0, width: 8, height: 8, rays: 1, entry: 1 };
+    for (picture, opened) in [(0, false), (2, false), (1, true)] {
+        let counts = Counts { primary: 7, ..Counts::default() };
+        let told = Message::Report { counts, tiles: 0, runs: 0, busy_nanoseconds: 0 };
+        master.handle(1, &View { picture, message: contributions, body: &[1; 64 * 24] });
+        master.handle(1, &View { picture, message: told, body: &[] });
+        assert_eq!(master.film().sums()[0] != [0; 3], opened, "{picture}");
+        assert_eq!(master.reports()[1].counts.primary == 7, opened, "{picture}");
+    }
+    assert_eq!(master.refused_frames(), 0);
+}
+
+/// A run whose dispatcher, or last node, is lost with the last tile of a picture has no more pictures.
+#[test]
+fn nobody_is_left_for_another_picture() {
+    for (dispatcher, lost) in [(HOST, &[1, 2][..]), (1, &[1])] {
+        let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
+        let mut nodes = vec![NodeReport::default(); 3];
+        let film = Film::new(&FRAME, &mut sums, &mut tiles).unwrap();
+        let mut master = Master::of_run(0, false, FRAME, film, &mut nodes, 9, dispatcher);
+        lost.iter().for_each(|&node| master.lost(node));
+        let nodes = master.release();
+        let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
+        let film = Film::new(&FRAME, &mut sums, &mut tiles).unwrap();
+        let mut master = Master::of_run(1, false, FRAME, film, nodes, 9, dispatcher);
+        master.poll(&mut Wire(Vec::new(), usize::MAX));
+        assert_eq!(master.outcome(), Some(Outcome::Abandoned));
+    }
+}
