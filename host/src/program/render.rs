@@ -259,11 +259,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     for warning in traced.iter().flat_map(film_warnings) {
         show.line(&format!("warning: {warning}"));
     }
+    let [import, build] = [import_time, prepared.build_time].map(|time| time.as_secs_f64());
+    let before = format!("import {import:.2} s, build {build:.2} s");
     for view in &drawn {
-        show.line(&view_line(&views[view.view], view));
+        let line = view_line(&views[view.view], view);
+        show.line(&if views.len() == 1 { format!("{line}; {before}") } else { line });
+    }
+    if views.len() > 1 {
+        show.line(&before);
     }
     let all = merged(&traced.iter().collect::<Vec<_>>());
-    show.line(&format!("import {:.2} s, build {:.2} s", import_time.as_secs_f64(), prepared.build_time.as_secs_f64()));
     if let Some((memory, fit)) = args.memory.zip(fit.as_ref()) {
         show.line(&traffic_line(&all, fit, memory));
     }
