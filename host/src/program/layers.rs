@@ -221,3 +221,101 @@ impl Drawing {
         all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Settings;
+    use crate::prepare::Prepared;
+    use crate::{build, framing, import};
+    use hybray_geometry::simd::Kernels;
+    use hybray_native::{DispatcherAt, Farm, Watch, trace_all};
+    use hybray_scheduler::{Options, Outcome, Progress};
+
+    /// Takes in a view's films as they end.
+    struct Takes<'a>(Drawing, std::slice::Iter<'a, (Part, Frame)>, Option<u64>);
+
+    impl Watch for Takes<'_> {
+        fn look(&mut self, _: Progress, _: &Film<'_>) -> bool {
+            true
+        }
+
+        fn end(&mut self, _: Outcome, film: &Film<'_>) {
+            let (part, frame) = self.1.next().unwrap();
+            self.2 = self.0.take(*part, frame, film).or(self.2);
+        }
+    }
+
+    const SEEDS: u64 = 200;
+    const SAMPLES: u32 = 8;
+
+    /// The estimate's mean over many seeds, and what the pixels vary by over the same seeds.
+    fn variances(scene: &str) -> (f64, f64) {
+        let mut model = import::load(scene).unwrap();
+        framing::complete_with_up(&mut model, import::up_axis(scene));
+        let prepared = Prepared::new(model, &build::Settings::default()).unwrap();
+        let pages = prepared.packed.open().unwrap();
+        let dispatcher = DispatcherAt::Host;
+        let options = Options::default();
+        let farm = Farm { nodes: 1, kernels: Kernels::detect(), dispatcher, shadow_bundles: true, options };
+        let (mut estimate, mut sums, mut squares) = (0.0, Vec::new(), Vec::new());
+        for seed in 0..SEEDS {
+            let wanted = Settings {
+                size: Some([16, 12]),
+                spp: Some(SAMPLES),
+                seed: Some(seed),
+                depth: Some(2),
+                ..Settings::default()
+            };
+            let light = prepared.frame(&prepared.cameras[0], &wanted);
+            let parts = Part::of(&[LayerChoice::Variance]).into_iter().map(|part| (part, part.frame(light)));
+            let parts: Vec<_> = parts.collect();
+            let frames: Vec<Frame> = parts.iter().map(|part| part.1).collect();
+            let mut takes = Takes(Drawing::of(&[LayerChoice::All], 1.0), parts.iter(), None);
+            trace_all(&prepared.scene(&pages), prepared.hash, &frames, &farm, &mut takes).unwrap();
+            let Takes(drawing, _, film) = takes;
+            if seed == 0 {
+                let parts = [(Part::Light, light)];
+                let mut whole = Takes(Drawing::default(), parts.iter(), None);
+                trace_all(&prepared.scene(&pages), prepared.hash, &[light], &farm, &mut whole).unwrap();
+                assert!(film.is_some() && film == whole.2, "the halves' film is the whole's");
+                assert_eq!(drawing.picture, whole.0.picture, "and so is the picture");
+                assert_eq!(drawing.samples, whole.0.samples);
+            }
+            let values = &drawing.picture.rgb;
+            sums.resize(values.len(), 0.0);
+            squares.resize(values.len(), 0.0);
+            for (at, &value) in values.iter().enumerate() {
+                sums[at] += f64::from(value);
+                squares[at] += f64::from(value) * f64::from(value);
+            }
+            let variance = drawing.variance.unwrap();
+            estimate += variance.iter().flatten().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
+        }
+        let n = SEEDS as f64;
+        let found = sums.iter().zip(&squares).map(|(sum, square)| (square - sum * sum / n) / (n - 1.0));
+        (estimate / n, found.sum::<f64>() / sums.len() as f64)
+    }
+
+    /// Where samples of a pixel do not know of each other the estimate is the variance; where they are stratified over the
+    /// pixel it is larger, and never much smaller.
+    #[test]
+    fn the_estimate_is_what_pixels_vary_by_over_seeds() {
+        for (scene, most) in [("cornell", 4.0), ("spd:balls:2", 4.0)] {
+            let (estimate, found) = variances(scene);
+            let ratio = estimate / found;
+            assert!((0.9..most).contains(&ratio), "{scene}: {estimate} estimated, {found} found: {ratio}");
+        }
+    }
+
+    #[test]
+    fn each_layer_has_its_pictures() {
+        assert_eq!(Part::of(&[]), [Part::Light]);
+        assert_eq!(Part::of(&[LayerChoice::Samples]), [Part::Light]);
+        assert_eq!(
+            Part::of(&[LayerChoice::Depth, LayerChoice::Variance]),
+            [Part::Even, Part::Odd, Part::Seen(Layer::Depth)]
+        );
+        assert_eq!(Part::of(&[LayerChoice::All]).len(), 6);
+    }
+}

@@ -173,3 +173,27 @@ fn a_missing_material_file_is_a_warning() {
     let (_, out) = folder.succeed("info triangle.obj");
     assert!(String::from_utf8(out).unwrap().contains("gone.mtl"));
 }
+
+#[test]
+fn views_and_layers_that_cannot_be() {
+    let camera = |name: &str| format!("[[camera]]\nname = \"{name}\"\neye = [0, 0, 9]\ntarget = [0, 0, 0]\n");
+    let folder = &folder()
+        .with("nameless.toml", "[[camera]]\neye = [0, 0, 9]\ntarget = [0, 0, 0]\n")
+        .with("path.toml", &camera("../up"))
+        .with("twice.toml", &(camera("a") + &camera("a")))
+        .with("more.toml", &(camera("a") + "[settings]\nspp = 3\n"))
+        .with("one.toml", &camera("a"));
+    let render = |rest: &str, words: &[&str]| check(folder, 1, &format!("render spd:balls:1 -q {rest}"), words);
+    render("-o a.png --cameras nosuch.toml", &["nosuch.toml", "no such file"]);
+    render("-o a.png --cameras empty.toml", &["empty.toml", "no cameras", "[[camera]]"]);
+    render("-o a.png --cameras nameless.toml", &["nameless.toml:1", "no `name`"]);
+    render("-o a.png --cameras path.toml", &["path.toml:2", "../up", "part of a file's name"]);
+    render("-o a.png --cameras twice.toml", &["twice.toml", "two cameras are called"]);
+    render("-o a.png --cameras more.toml", &["more.toml:5", "settings"]);
+    render("-o - --cameras one.toml", &["standard output", "-o out.png"]);
+    render("-o nosuch/a.png --cameras one.toml", &["nosuch/a-a.png"]);
+    render("-o a.png --layers depth", &["a.png", "-o out.exr"]);
+    render("-o a.exr --spp 1 --layers depth,variance", &["--spp 2"]);
+    check(folder, 2, "render spd:balls:1 -o a.png --cameras one.toml --camera a", &["--camera"]);
+    check(folder, 2, "render spd:balls:1 -o a.exr --layers colour", &["colour", "albedo"]);
+}

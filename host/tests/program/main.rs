@@ -11,6 +11,7 @@ mod resume;
 mod simulate;
 mod talk;
 mod trace;
+mod views;
 
 use std::fs;
 use std::io::Write;

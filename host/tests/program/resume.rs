@@ -13,8 +13,8 @@ use std::path::Path;
 
 const SIZE: [u32; 2] = [120, 70];
 /// 15 columns and 9 rows, the last one of six lines of pixels.
-const TILES: u32 = 15 * 9;
-const RENDER: &str = "--size 120x70 --spp 2 -q -o a.ppm";
+pub(super) const TILES: u32 = 15 * 9;
+pub(super) const RENDER: &str = "--size 120x70 --spp 2 -q -o a.ppm";
 
 /// Writes a film of a whole picture's tiles, as if it had ended when these were finished.
 struct Cut<'a> {
@@ -45,7 +45,7 @@ impl Watch for Cut<'_> {
 }
 
 /// What [`RENDER`] draws of a scene, with another tree.
-fn keep(folder: &Folder, scene: &str, has: &dyn Fn(u32) -> bool, black: Option<u32>) {
+pub(super) fn keep(folder: &Folder, scene: &str, has: &dyn Fn(u32) -> bool, black: Option<u32>) {
     let mut model = import::load(scene).unwrap();
     model.settings.size = Some(SIZE);
     framing::complete_with_up(&mut model, import::up_axis(scene));
@@ -65,7 +65,7 @@ fn keep(folder: &Folder, scene: &str, has: &dyn Fn(u32) -> bool, black: Option<u
     trace(&prepared.scene(&pages), prepared.hash, &frame, &farm, &mut cut).unwrap();
 }
 
-fn json(folder: &Folder, arguments: &str) -> Value {
+pub(super) fn json(folder: &Folder, arguments: &str) -> Value {
     let (talk, out) = folder.succeed(&format!("{arguments} --json -"));
     serde_json::from_slice(&out).unwrap_or_else(|e| panic!("{arguments}: {e}: {talk}"))
 }
