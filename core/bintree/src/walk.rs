@@ -74,6 +74,7 @@ impl core::ops::Sub for Counts {
             nodes: self.nodes.saturating_sub(b.nodes),
             blocks: self.blocks.saturating_sub(b.blocks),
             pages: self.pages.saturating_sub(b.pages),
+            look_ups: self.look_ups.saturating_sub(b.look_ups),
         }
     }
 }

@@ -60,7 +60,7 @@ impl Layer {
 
 /// In double precision: a square of small coordinates may vanish.
 fn distance(a: Vec3, b: Vec3) -> f32 {
-    let way = a.to_array().iter().zip(b.to_array()).map(|(&a, b)| f64::from(a) - f64::from(b));
+    let way = a.to_array().into_iter().zip(b.to_array()).map(|(a, b)| f64::from(a) - f64::from(b));
     libm::sqrt(way.map(|x| x * x).sum()) as f32
 }
 

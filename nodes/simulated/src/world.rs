@@ -135,10 +135,10 @@ impl<'a: 'm, 'm, 's> World<'a, 'm, 's> {
 
     pub fn run(mut self, watch: &mut dyn FnMut(Progress) -> bool) -> Result<Simulated, SimulateError> {
         loop {
-            if let Some(outcome) = self.master.outcome() {
-                if outcome != Outcome::Finished || !self.next() {
-                    return Ok(self.end(outcome));
-                }
+            if let Some(outcome) = self.master.outcome()
+                && (outcome != Outcome::Finished || !self.next())
+            {
+                return Ok(self.end(outcome));
             }
             let turn = self.schedule.first();
             let turn_ns = turn.map_or(u64::MAX, |(time, _)| time);
