@@ -34,32 +34,34 @@ pub struct Frame {
     pub hither: f32,
     /// What it shows: the number of a `Layer`, 0 for light.
     pub layer: u8,
-    /// Which of the samples it has: 0 all, 1 those of even numbers, 2 those of odd ones.
+    /// Which of the samples it has: 0 all, 1 or 2 one half ([`Frame::sample_from`]).
     pub half: u8,
 }
 
 impl Frame {
-    /// The first sample that it has, and how far it is from each to the next.
+    /// The first sample from `from` on that it has. Halves are those of the Thue-Morse sequence, by the parity of the ones in a
+    /// sample's number: sample points are stratified by its bits, and every second of them would lie in one half of the pixel.
     #[must_use]
-    pub const fn stride(&self) -> (u16, u16) {
-        match self.half {
-            0 => (0, 1),
-            1 => (0, 2),
-            _ => (1, 2),
-        }
+    pub fn sample_from(&self, from: u32) -> Option<u16> {
+        let has = |sample: &u32| self.half == 0 || sample.count_ones() % 2 + 1 == u32::from(self.half);
+        (from..u32::from(self.samples)).find(has).map(|sample| sample as u16)
     }
 
     /// Numbers of the samples that it has, of [`Frame::samples`].
     pub fn drawn(&self) -> impl Iterator<Item = u16> + Clone + use<> {
-        let (first, step) = self.stride();
-        (first..self.samples).step_by(usize::from(step))
+        let frame = *self;
+        core::iter::successors(frame.sample_from(0), move |&sample| frame.sample_from(u32::from(sample) + 1))
     }
 
     /// How many these are.
     #[must_use]
     pub const fn drawn_samples(&self) -> u16 {
-        let (first, step) = self.stride();
-        self.samples.saturating_sub(first).div_ceil(step)
+        if self.half == 0 || self.samples == 0 {
+            return self.samples;
+        }
+        // One of each pair, and the last if it has none beside it.
+        let last = self.samples % 2 == 1 && ((self.samples - 1).count_ones() % 2 + 1) as u8 == self.half;
+        self.samples / 2 + last as u16
     }
 }
 
@@ -456,6 +458,26 @@ mod tests {
         assert_eq!(decode(&[LATER, 0, 8]), Err(WireError::Head), "the first has no number");
         assert_eq!(decode(&[LATER, 1, LATER, 1, 8]), Err(WireError::Head), "a number is given once");
         assert_eq!(decode(&[LATER, 0xff, 0xff, 4, 8]), Err(WireError::Head), "a number of 17 bits");
+    }
+
+    #[test]
+    fn halves_share_the_samples_and_the_pixel() {
+        for samples in 0..70 {
+            let [all, even, odd] = [0, 1, 2].map(|half| Frame { samples, half, ..FRAME });
+            assert_eq!(all.drawn().count(), usize::from(samples));
+            for half in [all, even, odd] {
+                assert_eq!(half.drawn().count(), usize::from(half.drawn_samples()), "{samples}");
+            }
+            assert!(even.drawn().all(|sample| !odd.drawn().any(|other| other == sample)));
+            assert_eq!(even.drawn_samples() + odd.drawn_samples(), samples);
+            assert!(even.drawn_samples().abs_diff(odd.drawn_samples()) <= 1);
+            // In each half as many of either half of the pixel: the lowest bit says which, and above it quarters.
+            for half in [even, odd].iter().filter(|_| samples % 8 == 0) {
+                for bit in [1, 2] {
+                    assert_eq!(half.drawn().filter(|sample| sample & bit == 0).count(), usize::from(samples) / 4);
+                }
+            }
+        }
     }
 
     /// The examples of docs/WIRE.md.

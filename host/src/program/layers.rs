@@ -11,9 +11,9 @@ use hybray_wire::Frame;
 pub(super) enum Part {
     /// Light, all samples.
     Light,
-    /// Light, samples of even numbers.
+    /// Light, samples with an even number of ones in their number.
     Even,
-    /// Light, samples of odd numbers: what is missing of the former.
+    /// Light, those with an odd number: what is missing of the former.
     Odd,
     /// What is seen first.
     Seen(Layer),
@@ -297,8 +297,8 @@ mod tests {
         (estimate / n, found.sum::<f64>() / sums.len() as f64)
     }
 
-    /// Where samples of a pixel do not know of each other the estimate is the variance; where they are stratified over the
-    /// pixel it is larger, and never much smaller.
+    /// Samples are stratified over the pixel all together, and halves are not that even alone: the estimate is larger where edges
+    /// cross pixels, and not smaller than what is found.
     #[test]
     fn the_estimate_is_what_pixels_vary_by_over_seeds() {
         for (scene, most) in [("cornell", 4.0), ("spd:balls:2", 4.0)] {

@@ -182,10 +182,11 @@ fn views_and_layers_that_cannot_be() {
         .with("path.toml", &camera("../up"))
         .with("twice.toml", &(camera("a") + &camera("a")))
         .with("more.toml", &(camera("a") + "[settings]\nspp = 3\n"))
+        .with("none.toml", "# nobody\n")
         .with("one.toml", &camera("a"));
     let render = |rest: &str, words: &[&str]| check(folder, 1, &format!("render spd:balls:1 -q {rest}"), words);
     render("-o a.png --cameras nosuch.toml", &["nosuch.toml", "no such file"]);
-    render("-o a.png --cameras empty.toml", &["empty.toml", "no cameras", "[[camera]]"]);
+    render("-o a.png --cameras none.toml", &["none.toml", "no cameras", "[[camera]]"]);
     render("-o a.png --cameras nameless.toml", &["nameless.toml:1", "no `name`"]);
     render("-o a.png --cameras path.toml", &["path.toml:2", "../up", "part of a file's name"]);
     render("-o a.png --cameras twice.toml", &["twice.toml", "two cameras are called"]);

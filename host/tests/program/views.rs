@@ -95,7 +95,8 @@ fn layers_are_channels_beside_the_picture() {
     assert!(all["variance.G"].iter().all(|&v| v >= 0.0) && all["variance.G"].iter().any(|&v| v > 0.0));
     let length = |pixel: usize| ["X", "Y", "Z"].map(|c| all[&format!("normal.{c}")][pixel].powi(2)).iter().sum::<f32>();
     let unit = (0..40 * 24).filter(|&pixel| (length(pixel).sqrt() - 1.0).abs() < 1e-5).count();
-    assert!(unit > 600 && (0..40 * 24).all(|pixel| length(pixel) < 1.0 + 1e-5), "{unit}");
+    // The box does not fill the picture, and edges have shorter ones.
+    assert!(unit > 300 && (0..40 * 24).all(|pixel| length(pixel) < 1.0 + 1e-5), "{unit}");
     assert!(all["id"].iter().all(|id| id.fract() == 0.0), "numbers have no mean");
     folder.succeed("compare plain.exr all.exr");
     // Only what was asked for; whoever reads the picture alone reads the same.

@@ -530,7 +530,7 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
     fn work(&mut self, now: u64) -> bool {
         let Some(picture) = &self.picture else { return false };
         let frame = &picture.frame;
-        let (first_sample, step) = frame.stride();
+        let first_sample = frame.sample_from(0).unwrap_or(0);
         let NodeMemory { bundle, lane, tiles, pool, partials, owed, owing, peers, .. } = &mut self.memory;
         let Bundle { rays, walked, places, lit, together, stack } = &mut **bundle;
         let scene = self.scene.at_hand(&self.store);
@@ -658,19 +658,20 @@ impl<'m, 's, P: Store> Node<'m, 's, P> {
                     self.stage = Stage::Shading { sample, next: next + 1, end };
                 }
                 // Samples of one pixel draw on each other's pages; but one bundle a step is enough.
-                Stage::Shading { sample, .. } if frame.samples - sample > step => {
+                Stage::Shading { sample, .. } if frame.sample_from(u32::from(sample) + 1).is_some() => {
+                    let sample = frame.sample_from(u32::from(sample) + 1).unwrap_or(sample);
                     if bundles == 1 {
                         break;
                     }
                     bundles += 1;
                     let count = self.in_work.rays;
-                    start_sample(picture, sample + step, &places[..count], &mut rays[..count]);
+                    start_sample(picture, sample, &places[..count], &mut rays[..count]);
                     match &way {
                         None => trace_bundle(&scene, &rays[..count], walked, &mut walker),
                         Some(_) => trace_bundle(&scene.at_hand(&Nothing), &rays[..count], walked, &mut walker),
                     }
                     counts.primary += count as u64;
-                    self.stage = Stage::Shading { sample: sample + step, next: 0, end: count };
+                    self.stage = Stage::Shading { sample, next: 0, end: count };
                 }
                 Stage::Shading { .. } => {
                     self.stage = Stage::Idle;
