@@ -40,7 +40,9 @@ fn model() -> Model {
     Model {
         meshes: vec![floor],
         spheres: SPHERES.iter().map(|&(centre, radius, material)| Sphere { centre, radius, material }).collect(),
-        materials: materials().map(|material| NamedMaterial { name: String::new(), material }).to_vec(),
+        materials: materials()
+            .map(|material| NamedMaterial { name: String::new(), material, maps: Default::default() })
+            .to_vec(),
         cameras: vec![CameraSpec {
             name: "one".into(),
             eye: EYE,
