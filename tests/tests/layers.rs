@@ -41,7 +41,7 @@ fn model() -> Model {
         meshes: vec![floor],
         spheres: SPHERES.iter().map(|&(centre, radius, material)| Sphere { centre, radius, material }).collect(),
         materials: materials()
-            .map(|material| NamedMaterial { name: String::new(), material, maps: Default::default() })
+            .map(|material| NamedMaterial { name: String::new(), material, ..NamedMaterial::default() })
             .to_vec(),
         cameras: vec![CameraSpec {
             name: "one".into(),
