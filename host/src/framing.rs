@@ -124,6 +124,7 @@ fn frame((low, high): ([f32; 3], [f32; 3]), up: [f32; 3], aspect: f64) -> Camera
         fov_y_degrees: FOV_Y_DEGREES,
         hither: 0.0,
         size: None,
+        ..CameraSpec::default()
     }
 }
 

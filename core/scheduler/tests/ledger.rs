@@ -51,6 +51,7 @@ impl Picture {
             up: [0.0; 3],
             fov_y_degrees: 45.0,
             hither: 0.0,
+            optics: hybray_wire::Optics::PINHOLE,
         };
         let sums = vec![[5; 3]; (width * height) as usize];
         Self { frame, map, sums, tiles: vec![TileState::default(); map.len() as usize] }

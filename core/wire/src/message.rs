@@ -32,6 +32,31 @@ pub struct Frame {
     pub fov_y_degrees: f32,
     /// Distance along the view from which on something is seen.
     pub hither: f32,
+    /// What the camera makes of pixels.
+    pub optics: Optics,
+}
+
+/// A projection and a lens. Numbers are not checked here: a node passes over a picture whose camera is none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Optics {
+    /// The number of a `Projection`.
+    pub projection: u8,
+    /// From the picture's top to its bottom, if the camera is orthographic.
+    pub height: f32,
+    /// Radius of the lens; 0 for none.
+    pub radius: f32,
+    /// Distance along the view of what is sharp.
+    pub focus: f32,
+    /// Sides of the lens's opening; 0 if it is round.
+    pub blades: u8,
+    /// How far the opening is turned.
+    pub rotation_degrees: f32,
+}
+
+impl Optics {
+    /// Perspective, without a lens.
+    pub const PINHOLE: Self =
+        Self { projection: 0, height: 0.0, radius: 0.0, focus: 0.0, blades: 0, rotation_degrees: 0.0 };
 }
 
 /// What was traced, exactly: the same on any nodes.
@@ -321,6 +346,7 @@ mod tests {
         up: [0.0, 1.0, 0.0],
         fov_y_degrees: 45.0,
         hither: 0.0,
+        optics: Optics { blades: 255, focus: f32::MAX, ..Optics::PINHOLE },
     };
 
     fn check(message: Message) {

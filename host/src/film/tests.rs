@@ -7,7 +7,7 @@ use crate::prepare::Prepared;
 use crate::{framing, import};
 use hybray_bintree::midpoint;
 use hybray_scheduler::{Film, TileState};
-use hybray_wire::{Frame, TileMap};
+use hybray_wire::{Frame, Optics, TileMap};
 use proptest::prelude::*;
 use std::fs;
 
@@ -25,6 +25,7 @@ const FRAME: Frame = Frame {
     up: [0.0, 1.0, 0.0],
     fov_y_degrees: 40.0,
     hither: 0.5,
+    optics: Optics::PINHOLE,
 };
 
 fn subject() -> Subject {
@@ -181,6 +182,12 @@ fn another_picture_is_named() {
         Frame { up: [1.0, 0.0, 0.0], ..FRAME },
         Frame { fov_y_degrees: 41.0, ..FRAME },
         Frame { hither: 0.0, ..FRAME },
+        Frame { optics: Optics { projection: 2, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { height: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { radius: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { focus: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { blades: 5, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { rotation_degrees: 1.0, ..FRAME.optics }, ..FRAME },
     ] {
         check(77, frame, "another camera");
     }

@@ -142,6 +142,7 @@ mod tests {
             up: [0.0; 3],
             fov_y_degrees: 1.0,
             hither: 0.0,
+            optics: hybray_wire::Optics::PINHOLE,
         };
         let (mut sums, mut tiles) = ([[0; 3]; 128], [TileState::default(); 2]);
         let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();

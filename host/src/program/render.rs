@@ -20,7 +20,6 @@ use hybray_native::{DispatcherAt, Farm, NODES_MAX, Traced, Worked, trace, trace_
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{NodeReport, Outcome, Settings as NodeSettings, Sizes};
-use hybray_shading::Camera;
 use hybray_wire::Frame;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -61,13 +60,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     } else {
         let (model, import_time) = load(&args.scene, args.size)?;
         say(&model.warnings, model.primitives() as u64);
-        camera(&model.cameras, args.camera.as_deref())?;
+        camera(&model.cameras, &args.camera)?;
         if interrupted.load(Ordering::Relaxed) {
             return stopped_early(&show);
         }
         (Prepared::new(model, &args.tree.settings_with(page_bytes))?, import_time)
     };
-    let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
+    let camera = camera(&prepared.cameras, &args.camera)?;
     if interrupted.load(Ordering::Relaxed) {
         return stopped_early(&show);
     }
@@ -333,8 +332,7 @@ pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
 /// Nodes pass over a picture whose camera is none, so it is not sent to them: coordinates that are scaled with a tiny scene
 /// may leave the range of `f32`.
 pub(super) fn check_camera(frame: &Frame) -> Result<()> {
-    let [eye, target, up] = [frame.eye, frame.target, frame.up].map(Into::into);
-    Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height)
+    hybray_scheduler::camera(frame)
         .map_err(|error| anyhow!("{error}, in the scene's own unit: bring it nearer, or make the scene larger"))?;
     Ok(())
 }

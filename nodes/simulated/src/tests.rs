@@ -20,6 +20,7 @@ const FRAME: Frame = Frame {
     up: [0.0, 1.0, 0.0],
     fov_y_degrees: 40.0,
     hither: 0.0,
+    optics: hybray_wire::Optics::PINHOLE,
 };
 
 fn sky() -> Scene<'static> {

@@ -151,6 +151,7 @@ impl Toy {
             up: [0.0, 1.0, 0.0],
             fov_y_degrees: 26.0,
             hither: 0.0,
+            optics: hybray_wire::Optics::PINHOLE,
         }
     }
 }

@@ -77,6 +77,7 @@ fn begin(tiles: u32) -> Message {
         up: [0.0; 3],
         fov_y_degrees: 1.0,
         hither: 0.0,
+        optics: hybray_wire::Optics::PINHOLE,
     })
 }
 

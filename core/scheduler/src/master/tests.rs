@@ -48,6 +48,7 @@ const FRAME: Frame = Frame {
     up: [0.0; 3],
     fov_y_degrees: 1.0,
     hither: 0.0,
+    optics: hybray_wire::Optics::PINHOLE,
 };
 
 fn say(master: &mut Master<'_>, from: Peer, message: Message) {
