@@ -25,8 +25,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const SEEDS: u64 = 300;
 /// Every so many seeds one is run twice.
 const TWICE: u64 = 10;
-const NAMES: [&str; 7] =
-    ["spd:balls:1", "spd:teapot:2", "cornell:mirror", "spd:gears:1", "spd:mount:2", "organic:400", "spd:rings:1"];
+const NAMES: [&str; 9] = [
+    "spd:balls:1",
+    "spd:teapot:2",
+    "cornell:mirror",
+    "spd:gears:1@lens",
+    "spd:mount:2",
+    "organic:400@orthographic",
+    "spd:rings:1",
+    "spd:balls:1@blades",
+    "spd:teapot:2@spherical",
+];
 const PAGE_BYTES: [usize; 3] = [1024, 4096, 16_384];
 const SIZES: [([u32; 2], u32, u32); 3] = [([24, 24], 1, 4), ([40, 24], 2, 3), ([64, 48], 1, 2)];
 

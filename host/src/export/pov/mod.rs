@@ -30,6 +30,7 @@ use hybray_shading::{Light, LightKind, Material, Projection};
 
 use self::texture::texture;
 use super::{DEFAULT_DEPTH, Notes, extent, material_label};
+use crate::framing::basis;
 use crate::model::{CameraSpec, Mesh, Model};
 
 /// A number in the fewest digits: those of `f32` where it is one, and else those of `f64`.
@@ -140,7 +141,6 @@ fn view(camera: &CameraSpec, scale: f64, to: &mut dyn Write, notes: &mut Notes) 
     match camera.projection {
         Projection::Perspective => {}
         Projection::Orthographic => {
-            // As far from the eye as from the eye to the target, which is all that `direction` says here.
             let height = f64::from(camera.picture_height()) * scale;
             writeln!(to, "  orthographic")?;
             writeln!(to, "  location {}", Angled::times(camera.eye, scale))?;
@@ -150,11 +150,14 @@ fn view(camera: &CameraSpec, scale: f64, to: &mut dyn Write, notes: &mut Notes) 
             return writeln!(to, "}}");
         }
         Projection::Spherical => {
+            // Turned around `right` and then `up` from `direction`: both are the other way round for rows to go down and
+            // columns to the right, and a `look_at` would put one of them back.
+            let [right, above, back] = basis(camera).unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
             writeln!(to, "  spherical")?;
             writeln!(to, "  location {}", Angled::times(camera.eye, scale))?;
-            writeln!(to, "  up y")?;
-            writeln!(to, "  right -x")?;
-            place(to)?;
+            writeln!(to, "  direction {}", Angled(back.map(|c| -c)))?;
+            writeln!(to, "  up {}", Angled(above.map(|c| -c)))?;
+            writeln!(to, "  right {}", Angled(right.map(|c| -c)))?;
             writeln!(to, "  angle 360 180")?;
             return writeln!(to, "}}");
         }
@@ -176,7 +179,8 @@ fn view(camera: &CameraSpec, scale: f64, to: &mut dyn Write, notes: &mut Notes) 
         let view = [0, 1, 2].map(|i| f64::from(camera.target[i]) - f64::from(camera.eye[i]));
         let length = view.iter().map(|c| c * c).sum::<f64>().sqrt();
         let focus = along(camera.eye.map(f64::from), view, f64::from(camera.focus_distance()) / length);
-        writeln!(to, "  aperture {}", 2.0 * f64::from(camera.aperture) * scale)?;
+        // Twice the diameter: POV-Ray's samples fill a circle of half of what it is told.
+        writeln!(to, "  aperture {}", 4.0 * f64::from(camera.aperture) * scale)?;
         writeln!(to, "  focal_point {}", Angled(focus.map(|c| c * scale)))?;
         writeln!(to, "  blur_samples {BLUR_SAMPLES}")?;
         writeln!(to, "  variance 0")?;
