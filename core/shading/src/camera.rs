@@ -747,6 +747,22 @@ mod tests {
         assert_eq!(around.outermost([0, 0], [6, 7]).count(), 6);
     }
 
+    /// What a ray stands for is found again by its direction.
+    #[test]
+    fn footprints_are_those_of_rays() {
+        let pose = pose([30, 40]);
+        let lens = Lens { radius: 0.3, focus: 4.0, blades: 5, rotation_degrees: 12.0 };
+        let perspective = Camera::perspective(&pose, 80.0, lens).unwrap();
+        for camera in [perspective, Camera::orthographic(&pose, 3.0).unwrap(), Camera::spherical(&pose).unwrap()] {
+            for (x, y) in (0..30).flat_map(|x| (0..40).map(move |y| (x, y))) {
+                let ray = camera.sample(Filter::Tent, 4, [x, y], 1, 3);
+                let [width, spread] = camera.footprint(ray.direction);
+                assert_eq!(width, ray.width);
+                assert!((spread - ray.spread).abs() <= 1e-4 * ray.spread, "{camera:?} {x} {y}: {spread} {ray:?}");
+            }
+        }
+    }
+
     #[test]
     fn bad_lenses_and_projections_are_refused() {
         let lens = Lens { radius: 0.1, focus: 2.0, blades: 6, rotation_degrees: 30.0 };
