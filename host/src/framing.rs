@@ -124,11 +124,12 @@ fn frame((low, high): ([f32; 3], [f32; 3]), up: [f32; 3], aspect: f64) -> Camera
         fov_y_degrees: FOV_Y_DEGREES,
         hither: 0.0,
         size: None,
+        ..CameraSpec::default()
     }
 }
 
 /// Right, above and back (towards the eye) of a camera; `None` if it has no direction.
-fn basis(camera: &CameraSpec) -> Option<[[f64; 3]; 3]> {
+pub(crate) fn basis(camera: &CameraSpec) -> Option<[[f64; 3]; 3]> {
     let back = unit([0, 1, 2].map(|i| f64::from(camera.eye[i]) - f64::from(camera.target[i])))?;
     let right = unit(cross(camera.up.map(f64::from), back))?;
     Some([right, cross(back, right), back])

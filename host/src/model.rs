@@ -4,7 +4,7 @@
 //! turn, then spheres, then cones.
 
 use crate::texture::Texture;
-use hybray_shading::{Light, Map, Maps, Material};
+use hybray_shading::{Light, Map, Maps, Material, Projection};
 
 /// Triangles that share a material and whether they have vertex normals.
 #[derive(Clone, Debug, Default)]
@@ -68,8 +68,8 @@ impl Default for NamedMaterial {
     }
 }
 
-/// A pinhole camera.
-#[derive(Clone, Debug, PartialEq)]
+/// A camera. Lengths are file units.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CameraSpec {
     /// For `--camera NAME`.
     pub name: String,
@@ -79,12 +79,47 @@ pub struct CameraSpec {
     pub target: [f32; 3],
     /// Up, not along the view.
     pub up: [f32; 3],
-    /// Angle between the top and the bottom edge of the picture, degrees, more than 0 and less than 180.
+    /// Angle between the top and the bottom edge of the picture, degrees, more than 0 and less than 180. If the camera is not
+    /// perspective, that of the perspective one in its place.
     pub fov_y_degrees: f32,
     /// Rays start at this distance along the view axis (NFF's hither); 0 to start at the eye.
     pub hither: f32,
     /// Picture size that the file asks for, in pixels.
     pub size: Option<[u32; 2]>,
+    /// How pixels become rays.
+    pub projection: Projection,
+    /// What an orthographic camera's picture shows from top to bottom, more than 0; if it is missing, as much as `fov_y_degrees`
+    /// does at the target.
+    pub height: Option<f32>,
+    /// Radius of a perspective camera's lens; 0 for none: everything is sharp.
+    pub aperture: f32,
+    /// Distance along the view axis of what is sharp, more than 0; if it is missing, that of the target.
+    pub focus: Option<f32>,
+    /// Sides of the lens's opening, 3 to 16; 0 if it is round.
+    pub blades: u8,
+    /// How far the opening is turned counterclockwise, degrees.
+    pub blade_rotation_degrees: f32,
+}
+
+impl CameraSpec {
+    /// From the eye to the target.
+    fn distance(&self) -> f64 {
+        let square = |i: usize| (f64::from(self.target[i]) - f64::from(self.eye[i])).powi(2);
+        (square(0) + square(1) + square(2)).sqrt()
+    }
+
+    /// What an orthographic camera's picture shows from top to bottom.
+    #[must_use]
+    pub fn picture_height(&self) -> f32 {
+        let half = libm::tan(f64::from(self.fov_y_degrees) * (std::f64::consts::PI / 360.0));
+        self.height.unwrap_or((2.0 * half * self.distance()) as f32)
+    }
+
+    /// Distance along the view axis of what is sharp.
+    #[must_use]
+    pub fn focus_distance(&self) -> f32 {
+        self.focus.unwrap_or(self.distance() as f32)
+    }
 }
 
 /// Objects as the file counts them: one polygon may become several triangles.

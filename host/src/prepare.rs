@@ -6,9 +6,9 @@ use crate::framing;
 use crate::model::{CameraSpec, Model, Objects, Settings};
 use crate::pack::{self, HybError, Packing};
 use hybray_scheduler::Step;
-use hybray_shading::{Filter, Light, LightKind, Map, MapTables, Maps, Material, spawn};
+use hybray_shading::{Filter, Light, LightKind, Map, MapTables, Maps, Material, Projection, spawn};
 use hybray_tracer::{Layer, Scene};
-use hybray_wire::Frame;
+use hybray_wire::{Frame, Optics};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -204,7 +204,9 @@ impl Prepared {
         let own = &self.settings;
         let scale = libm::ldexpf(1.0, self.packed.scale_log2);
         let scaled = |v: [f32; 3]| v.map(|x| x * scale);
-        let [width, height] = wanted.size.or(own.size).or(camera.size).unwrap_or(SIZE);
+        // All around is twice as wide as high.
+        let usual = if camera.projection == Projection::Spherical { [2 * SIZE[1], SIZE[1]] } else { SIZE };
+        let [width, height] = wanted.size.or(own.size).or(camera.size).unwrap_or(usual);
         let filter = wanted.filter.as_deref().or(own.filter.as_deref()).and_then(Filter::parse);
         Frame {
             width,
@@ -222,6 +224,20 @@ impl Prepared {
             hither: camera.hither * scale,
             layer: Layer::Light as u8,
             half: 0,
+            optics: match camera.projection {
+                Projection::Perspective if camera.aperture > 0.0 => Optics {
+                    radius: camera.aperture * scale,
+                    focus: camera.focus_distance() * scale,
+                    blades: camera.blades,
+                    rotation_degrees: camera.blade_rotation_degrees,
+                    ..Optics::PINHOLE
+                },
+                projection => Optics {
+                    projection: projection as u8,
+                    height: if projection == Projection::Orthographic { camera.picture_height() * scale } else { 0.0 },
+                    ..Optics::PINHOLE
+                },
+            },
         }
     }
 

@@ -7,6 +7,7 @@ use hybray::{framing, import};
 use hybray_geometry::simd::Kernels;
 use hybray_native::{Farm, trace};
 use hybray_scheduler::Outcome;
+use hybray_shading::Projection;
 use hybray_wire::Counts;
 
 /// What a picture came to: all of it a function of the scene and the settings that change pictures.
@@ -20,14 +21,31 @@ pub struct Picture {
     pub tiles: u32,
 }
 
-/// A built-in scene or a file, with camera and lights, as the program has it.
+/// A built-in scene or a file, with camera and lights, as the program has it. After its name may stand `@lens`, `@blades`,
+/// `@orthographic` or `@spherical`: its first camera is one of those then.
 ///
 /// # Panics
-/// If there is no such scene.
+/// If there is no such scene, or camera.
 #[must_use]
 pub fn scene(name: &str) -> Model {
+    let (name, optics) = name.split_once('@').unwrap_or((name, ""));
     let mut model = import::load(name).unwrap_or_else(|e| panic!("{e}"));
     framing::complete_with_up(&mut model, import::up_axis(name));
+    let camera = &mut model.cameras[0];
+    let distance = camera.focus_distance();
+    match optics {
+        "" => {}
+        "lens" => (camera.aperture, camera.focus) = (0.03 * distance, Some(0.8 * distance)),
+        "blades" => (camera.aperture, camera.blades, camera.blade_rotation_degrees) = (0.1 * distance, 5, 20.0),
+        "orthographic" => camera.projection = Projection::Orthographic,
+        "spherical" => {
+            // From nearer by, so that not all but a few pixels are background.
+            let closer = |i: usize| 0.5 * (camera.eye[i] + camera.target[i]);
+            (camera.eye, camera.hither) = ([closer(0), closer(1), closer(2)], 0.0);
+            camera.projection = Projection::Spherical;
+        }
+        other => panic!("there is no camera @{other}"),
+    }
     model
 }
 

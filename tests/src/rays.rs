@@ -3,7 +3,7 @@
 use crate::Random;
 use hybray::model::Model;
 use hybray_geometry::{Ray, Vec3};
-use hybray_shading::Camera;
+use hybray_shading::{Camera, Filter, Lens, Pose, Projection};
 
 /// A ray through the box around -1 to 1; every fourth on a coarse grid, along an axis or a diagonal.
 pub fn random_ray(random: &mut Random) -> Ray {
@@ -57,8 +57,8 @@ pub fn close_rays(random: &mut Random, extent: [Vec3; 2], count: usize) -> Vec<R
         .collect()
 }
 
-/// The rays through the pixels of a square picture of the model's first camera, along Morton's curve, so that every run
-/// of them is compact. `unit`: internal units of a file unit; `side` is a power of two.
+/// The rays through the pixels of a square picture of the model's first camera and its lens, along Morton's curve, so that
+/// every run of them is compact. `unit`: internal units of a file unit; `side` is a power of two.
 ///
 /// # Panics
 /// If there is no camera, or it is none.
@@ -66,13 +66,22 @@ pub fn close_rays(random: &mut Random, extent: [Vec3; 2], count: usize) -> Vec<R
 pub fn camera_rays(model: &Model, unit: f32, side: u32) -> Vec<Ray> {
     let spec = &model.cameras[0];
     let scaled = |p: [f32; 3]| Vec3::from(p) * unit;
-    let (eye, target) = (scaled(spec.eye), scaled(spec.target));
-    let camera = Camera::look(eye, target, spec.up.into(), spec.fov_y_degrees, spec.hither * unit, side, side);
+    let (eye, target, up, hither) = (scaled(spec.eye), scaled(spec.target), spec.up.into(), spec.hither * unit);
+    let pose = Pose { eye, target, up, hither, size: [side, side] };
+    let camera = match spec.projection {
+        Projection::Perspective => {
+            let (radius, focus) = (spec.aperture * unit, spec.focus_distance() * unit);
+            let (blades, rotation_degrees) = (spec.blades.into(), spec.blade_rotation_degrees);
+            Camera::perspective(&pose, spec.fov_y_degrees, Lens { radius, focus, blades, rotation_degrees })
+        }
+        Projection::Orthographic => Camera::orthographic(&pose, spec.picture_height() * unit),
+        Projection::Spherical => Camera::spherical(&pose),
+    };
     let camera = camera.unwrap_or_else(|e| panic!("{e}"));
     let even_bits = |code: u32| (0..16).fold(0, |bits, i| bits | (code >> (2 * i) & 1) << i);
     (0..side * side)
         .map(|code| {
-            let seen = camera.ray(even_bits(code), even_bits(code >> 1), [0.0; 2]);
+            let seen = camera.sample(Filter::Box, 0, [even_bits(code), even_bits(code >> 1)], 0, 1);
             Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY }
         })
         .collect()

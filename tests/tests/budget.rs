@@ -128,6 +128,14 @@ fn balls() {
 }
 
 #[test]
+fn lenses_and_projections() {
+    check("spd:balls:2@blades", 4096, PageForm::Full, 2);
+    check("spd:teapot:3@lens", 4096, PageForm::Compact, 1);
+    check("spd:balls:2@orthographic", 4096, PageForm::Full, 1);
+    check("organic:2000@spherical", 4096, PageForm::Full, 1);
+}
+
+#[test]
 fn glass() {
     let light_pages =
         check("spd:teapot:3", 4096, PageForm::Full, 1) + check("spd:teapot:3", 16_384, PageForm::Compact, 1);

@@ -221,6 +221,7 @@ fn ball(rings: u32, segments: u32) -> Model {
             fov_y_degrees: 40.0,
             hither: 0.0,
             size: None,
+            ..CameraSpec::default()
         }],
         ..Model::default()
     }

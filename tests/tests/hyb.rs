@@ -24,7 +24,7 @@ impl Scratch {
 
     /// Packs a scene, and gives what was written.
     fn packed(name: &str, settings: &Settings) -> (Self, Model) {
-        let scratch = Self::new(&name.replace(':', "-"));
+        let scratch = Self::new(&name.replace([':', '@'], "-"));
         let model = scene(name);
         let mut about = model.clone();
         (about.meshes, about.spheres, about.cones) = Default::default();
@@ -73,6 +73,8 @@ fn what_comes_out_is_what_went_in() {
     check("spd:teapot:5", Rule::SurfaceArea, Voxels::Grid([2, 3, 1]), PageForm::Full);
     check("spd:tree:5", midpoints, Voxels::Adaptive(9), PageForm::Full);
     check("cornell:mirror", midpoints, Voxels::One, PageForm::Compact);
+    check("spd:balls:2@blades", Rule::SurfaceArea, Voxels::One, PageForm::Full);
+    check("spd:balls:2@orthographic", Rule::SurfaceArea, Voxels::One, PageForm::Full);
     check("terrain:3000", Rule::SurfaceArea, Voxels::Adaptive(4), PageForm::Compact);
 }
 

@@ -49,8 +49,8 @@ fn model() -> Model {
             target: TARGET,
             up: [0.0, 1.0, 0.0],
             fov_y_degrees: FOV,
-            hither: 0.0,
             size: Some(SIZE),
+            ..CameraSpec::default()
         }],
         ..Model::default()
     }

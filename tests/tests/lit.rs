@@ -53,6 +53,7 @@ fn check(axis: usize, height: f32, size: f32) {
             fov_y_degrees: 30.0,
             hither: 0.0,
             size: None,
+            ..CameraSpec::default()
         }],
         ..Model::default()
     };
@@ -124,6 +125,7 @@ fn a_lamp_shines_through_glass() {
                 fov_y_degrees: 60.0,
                 hither: 0.0,
                 size: None,
+                ..CameraSpec::default()
             }],
             ..Model::default()
         };

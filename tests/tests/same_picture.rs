@@ -98,4 +98,8 @@ same_picture! {
     gallery: "gallery:64" [80, 60] "tent";
     terrain: "terrain:5000" [96, 96] "box";
     conference: "paper:conference:9" [72, 72] "box";
+    lens: "spd:balls:2@lens" [70, 61] "gaussian";
+    blades: "cornell:mirror@blades" [61, 70] "box";
+    orthographic: "spd:gears:1@orthographic" [70, 61] "tent";
+    spherical: "cornell@spherical" [90, 45] "gaussian";
 }

@@ -85,7 +85,7 @@ fn drawn(name: &str, nodes: u16, settings: Settings, stranger: Option<Stranger<'
 
 #[test]
 fn nothing_is_allocated_after_the_seal() {
-    for name in ["spd:balls:2", "spd:mount:2"] {
+    for name in ["spd:balls:2", "spd:mount:2@lens", "spd:balls:2@spherical", "spd:balls:2@orthographic"] {
         let alone = drawn(name, 1, Settings::default(), None);
         assert_eq!(alone.outcome, Some(Outcome::Finished), "{name}");
         for (at, (_, policy)) in Policy::ALL.into_iter().enumerate() {

@@ -27,8 +27,17 @@ const SEEDS: u64 = 300;
 const TWICE: u64 = 10;
 /// Every so many seeds one is run with several pictures, too.
 const SEVERAL: u64 = 2;
-const NAMES: [&str; 7] =
-    ["spd:balls:1", "spd:teapot:2", "cornell:mirror", "spd:gears:1", "spd:mount:2", "organic:400", "gallery:48"];
+const NAMES: [&str; 9] = [
+    "spd:balls:1",
+    "spd:teapot:2",
+    "cornell:mirror",
+    "spd:gears:1@lens",
+    "spd:mount:2",
+    "organic:400@orthographic",
+    "gallery:48",
+    "spd:balls:1@blades",
+    "spd:teapot:2@spherical",
+];
 const PAGE_BYTES: [usize; 3] = [1024, 4096, 16_384];
 const SIZES: [([u32; 2], u32, u32); 3] = [([24, 24], 1, 4), ([40, 24], 2, 3), ([64, 48], 1, 2)];
 

@@ -294,6 +294,7 @@ mod tests {
             hither: 0.0,
             layer: 0,
             half: 0,
+            optics: hybray_wire::Optics::PINHOLE,
         };
         let (mut sums, mut tiles) = ([[0; 3]; 80], [TileState::default(); 2]);
         let mut film = Film::new(&frame, &mut sums, &mut tiles).unwrap();

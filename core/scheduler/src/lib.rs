@@ -26,7 +26,7 @@ pub use ledger::Balance;
 pub use master::{Master, NodeReport, Outcome, Progress};
 pub use node::{
     All, BUNDLE, Backing, Cache, CachePlace, Charged, DEPTH_MAX, HighWater, Landed, Limits, Node, NodeMemory, Own,
-    REQUESTS_MAX, Settings, Store, Traffic, can_draw,
+    REQUESTS_MAX, Settings, Store, Traffic, camera, can_draw,
 };
 
 pub use plan::{Plan, PlanError, Sizes, bytes_of_copies};

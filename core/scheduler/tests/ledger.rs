@@ -53,6 +53,7 @@ impl Picture {
             hither: 0.0,
             layer: 0,
             half: 0,
+            optics: hybray_wire::Optics::PINHOLE,
         };
         let sums = vec![[5; 3]; (width * height) as usize];
         Self { frame, map, sums, tiles: vec![TileState::default(); map.len() as usize] }

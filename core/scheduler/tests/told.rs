@@ -170,7 +170,7 @@ fn said_later(from: Peer, picture: u16, message: Message) -> Vec<(Peer, Message)
     let mut memory = Box::<[u8]>::new_uninit_slice(NodeMemory::sum(&limits).total_bytes() as usize + LINE_BYTES - 1);
     let memory = NodeMemory::carve(&mut Arena::new(&mut memory), &limits).expect("the sum of its terms");
     let (scene, settings) = (toy.scene(&pages), Settings::default());
-    let mut node = Node::new(scene, All(&pages), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
+    let mut node = Node::new(scene, All(&pages, &[]), SCENE_HASH, Kernels::Portable, 1, HOST, settings, memory);
     let mut link = Sent::default();
     let hear = |node: &mut Node<'_, '_, All<'_>>, from, picture, message: Message| {
         node.handle(from, &View { picture, message, body: &vec![0; message.body_bytes()] });

@@ -32,6 +32,37 @@ pub(crate) fn stratified(key: u64, index: u32, count: u32) -> [f32; 2] {
     [unit(x as u32), unit(y as u32)]
 }
 
+/// The place of `index` in a permutation of `0..count` that `key` names, for points of two sets to be paired at random.
+/// `index` must be below `count`; if it is not, it is taken for the last.
+///
+/// A hash of as many bits as `count` needs is a bijection of these; what it takes beyond `count` is hashed again until it
+/// is not, on average less than once. Source: Kensler, *Correlated Multi-Jittered Sampling*, 2013, section 5.
+pub(crate) fn permuted(index: u32, count: u32, key: u64) -> u32 {
+    let last = count.max(1) - 1;
+    let mask = u32::MAX.checked_shr(last.leading_zeros()).unwrap_or(0);
+    let p = (key >> 32) as u32 ^ key as u32;
+    let mut i = index.min(last);
+    loop {
+        i = (i ^ p).wrapping_mul(0xe170_893d);
+        i ^= p >> 16;
+        i ^= (i & mask) >> 4;
+        i = (i ^ p >> 8).wrapping_mul(0x0929_eb3f);
+        i ^= p >> 23;
+        i ^= (i & mask) >> 1;
+        i = i.wrapping_mul(1 | p >> 27).wrapping_mul(0x6935_fa69);
+        i ^= (i & mask) >> 11;
+        i = i.wrapping_mul(0x74dc_b303);
+        i ^= (i & mask) >> 2;
+        i = i.wrapping_mul(0x9e50_1cc3);
+        i ^= (i & mask) >> 2;
+        i = i.wrapping_mul(0xc860_a3df) & mask;
+        i ^= i >> 5;
+        if i <= last {
+            return ((u64::from(i) + u64::from(p)) % (u64::from(last) + 1)) as u32;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,6 +132,31 @@ mod tests {
         for (index, count) in [(0, 0), (5, 0), (9, 3), (u32::MAX, u32::MAX), (u32::MAX - 1, u32::MAX), (0, u32::MAX)] {
             let p = stratified(1, index, count);
             assert!(p.iter().all(|u| (0.0..1.0).contains(u)), "{index} of {count}: {p:?}");
+        }
+    }
+
+    #[test]
+    fn permutations_are_permutations_and_differ() {
+        for count in [1u32, 2, 3, 5, 8, 9, 16, 100, 1000, 65_535] {
+            let mut firsts = vec![0u32; count as usize];
+            for key in 0..50 {
+                let key = crate::id::primary_id(4, key, 0);
+                let mut places: Vec<u32> = (0..count).map(|i| permuted(i, count, key)).collect();
+                firsts[places[0] as usize] += 1;
+                assert_eq!(permuted(count, count, key), places[count as usize - 1], "beyond the last");
+                places.sort_unstable();
+                assert!(places.iter().zip(0..).all(|(a, b)| *a == b), "{count}");
+            }
+            assert!(count < 2 || firsts.iter().all(|&n| n < 40), "{count}: the same place for most keys");
+        }
+        // Every place of a few goes everywhere as often.
+        for index in 0..5 {
+            let mut bins = [0u32; 5];
+            for key in 0..50_000 {
+                bins[permuted(index, 5, crate::id::primary_id(4, key, 0)) as usize] += 1;
+            }
+            // Five deviations of 89.
+            assert!(bins.iter().all(|n| n.abs_diff(10_000) < 450), "{index}: {bins:?}");
         }
     }
 }

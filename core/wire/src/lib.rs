@@ -9,8 +9,8 @@ mod record;
 mod tiles;
 
 pub use message::{
-    BODY_BYTES_MAX, CLIPLIST_MAX, Counts, Frame, HEAD_BYTES_MAX, MESSAGE_BYTES_MAX, Message, View, WireError, decode,
-    encode,
+    BODY_BYTES_MAX, CLIPLIST_MAX, Counts, Frame, HEAD_BYTES_MAX, MESSAGE_BYTES_MAX, Message, Optics, View, WireError,
+    decode, encode,
 };
 pub use record::{Partial, RayKind, RayRecord, ShadowRecord};
 pub use tiles::{TILE, Tile, TileMap};

@@ -36,6 +36,8 @@ pub struct Frame {
     pub layer: u8,
     /// Which of the samples it has: 0 all, 1 or 2 one half ([`Frame::sample_from`]).
     pub half: u8,
+    /// What the camera makes of pixels.
+    pub optics: Optics,
 }
 
 impl Frame {
@@ -63,6 +65,29 @@ impl Frame {
         let last = self.samples % 2 == 1 && ((self.samples - 1).count_ones() % 2 + 1) as u8 == self.half;
         self.samples / 2 + last as u16
     }
+}
+
+/// A projection and a lens. Numbers are not checked here: a node passes over a picture whose camera is none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Optics {
+    /// The number of a `Projection`.
+    pub projection: u8,
+    /// From the picture's top to its bottom, if the camera is orthographic.
+    pub height: f32,
+    /// Radius of the lens; 0 for none.
+    pub radius: f32,
+    /// Distance along the view of what is sharp.
+    pub focus: f32,
+    /// Sides of the lens's opening; 0 if it is round.
+    pub blades: u8,
+    /// How far the opening is turned.
+    pub rotation_degrees: f32,
+}
+
+impl Optics {
+    /// Perspective, without a lens.
+    pub const PINHOLE: Self =
+        Self { projection: 0, height: 0.0, radius: 0.0, focus: 0.0, blades: 0, rotation_degrees: 0.0 };
 }
 
 /// What was traced, exactly: the same on any nodes.
@@ -385,6 +410,7 @@ mod tests {
         hither: 0.0,
         layer: 0,
         half: 0,
+        optics: Optics { blades: 255, focus: f32::MAX, ..Optics::PINHOLE },
     };
 
     fn check(message: Message) {

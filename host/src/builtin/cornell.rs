@@ -70,6 +70,7 @@ fn room() -> Model {
             fov_y_degrees: 39.307_65,
             hither: 0.0,
             size: Some([512, 512]),
+            ..CameraSpec::default()
         }],
         ambient: [0.10, 0.085, 0.06],
         // A ray goes into the glass, out of it, to the mirror and on.

@@ -227,8 +227,8 @@ pub fn gallery(side: u32) -> Model {
         target: [0.0, 0.8, 0.0],
         up: [0.0, 1.0, 0.0],
         fov_y_degrees: 40.0,
-        hither: 0.0,
         size: Some([640, 480]),
+        ..CameraSpec::default()
     });
     model.settings = Settings { spp: Some(16), ..Settings::default() };
     model

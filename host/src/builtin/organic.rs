@@ -57,6 +57,7 @@ fn camera() -> CameraSpec {
         fov_y_degrees: 45.0,
         hither: 0.0,
         size: None,
+        ..CameraSpec::default()
     }
 }
 

@@ -138,7 +138,8 @@ fn check(model: &Model, camera: &CameraSpec) -> Result<(), ExportError> {
         &camera.eye,
         &camera.target,
         &camera.up,
-        &[camera.fov_y_degrees, camera.hither],
+        &[camera.fov_y_degrees, camera.hither, camera.picture_height()],
+        &[camera.aperture, camera.focus_distance()],
         &model.background,
         &model.ambient,
     ]) {

@@ -6,13 +6,13 @@
 
 use std::io::{self, Write};
 
-use hybray_shading::{Highlight, Light, LightKind};
+use hybray_shading::{Highlight, Light, LightKind, Projection};
 
 use super::{Notes, Spaced, extent, grey, material_label, mean};
 use crate::model::{CameraSpec, Model};
 
 pub(super) fn write(model: &Model, camera: &CameraSpec, to: &mut dyn Write, notes: &mut Notes) -> io::Result<()> {
-    view(model, camera, to)?;
+    view(model, camera, to, notes)?;
     writeln!(to, "b {}", Spaced(model.background))?;
     lights(model, to, notes)?;
     if model.ambient != [0.0; 3] {
@@ -49,7 +49,12 @@ pub(super) fn write(model: &Model, camera: &CameraSpec, to: &mut dyn Write, note
     Ok(())
 }
 
-fn view(model: &Model, camera: &CameraSpec, to: &mut dyn Write) -> io::Result<()> {
+fn view(model: &Model, camera: &CameraSpec, to: &mut dyn Write, notes: &mut Notes) -> io::Result<()> {
+    if camera.projection != Projection::Perspective {
+        notes.add("NFF has perspective cameras only, so another picture will be drawn", "the camera");
+    } else if camera.aperture > 0.0 {
+        notes.add("NFF has no lenses, so all is sharp", "the camera");
+    }
     let [width, height] = model.settings.size.or(camera.size).unwrap_or([512, 512]);
     writeln!(to, "v")?;
     writeln!(to, "from {}", Spaced(camera.eye))?;

@@ -15,6 +15,7 @@ pub(crate) fn camera() -> CameraSpec {
         fov_y_degrees: 40.0,
         hither: 0.0,
         size: Some([160, 120]),
+        ..CameraSpec::default()
     }
 }
 

@@ -1,4 +1,4 @@
-//! The first 128 bytes of a film file: whose film it is.
+//! The first 152 bytes of a film file: whose film it is.
 
 use crate::build::hash_bytes;
 use bytemuck::{Pod, Zeroable};
@@ -8,7 +8,7 @@ use hybray_wire::{Frame, TileMap};
 /// Bytes that start a file: name, an end of line and an end of text that transfers as text would spoil.
 const MAGIC: [u8; 8] = *b"hyfilm\r\x1a";
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Version of the program: another one may draw other bits.
 const PROGRAM: [u32; 3] = {
     const fn number(text: &str) -> u32 {
@@ -61,9 +61,14 @@ pub(super) struct FileHeader {
     pub up: [f32; 3],
     pub fov_y_degrees: f32,
     pub hither: f32,
+    pub projection: u32,
+    pub picture_height: f32,
+    /// Radius, distance of what is sharp, degrees that the opening is turned.
+    pub lens: [f32; 3],
+    pub blades: u32,
 }
 
-const _: () = assert!(size_of::<FileHeader>() == 128);
+const _: () = assert!(size_of::<FileHeader>() == 152);
 
 impl FileHeader {
     /// Of a film of `subject` that has no tiles yet.
@@ -90,6 +95,10 @@ impl FileHeader {
             up: f.up,
             fov_y_degrees: f.fov_y_degrees,
             hither: f.hither,
+            projection: f.optics.projection.into(),
+            picture_height: f.optics.height,
+            lens: [f.optics.radius, f.optics.focus, f.optics.rotation_degrees],
+            blades: f.optics.blades.into(),
         }
     }
 
@@ -151,7 +160,10 @@ impl FileHeader {
             )
         });
         // As they are written: what is not equal to itself is no other camera.
-        let camera = |h: &Self| [h.eye, h.target, h.up, [h.fov_y_degrees, h.hither, 0.0]].map(|v| v.map(f32::to_bits));
+        let camera = |h: &Self| {
+            let numbers = [h.eye, h.target, h.up, [h.fov_y_degrees, h.hither, h.picture_height], h.lens];
+            (numbers.map(|v| v.map(f32::to_bits)), h.projection, h.blades)
+        };
         note(camera(a) != camera(b), &|| "another camera".to_owned());
         all
     }

@@ -7,7 +7,7 @@ use crate::prepare::Prepared;
 use crate::{framing, import};
 use hybray_bintree::midpoint;
 use hybray_scheduler::{Film, TileState};
-use hybray_wire::{Frame, TileMap};
+use hybray_wire::{Frame, Optics, TileMap};
 use proptest::prelude::*;
 use std::fs;
 
@@ -27,6 +27,7 @@ const FRAME: Frame = Frame {
     hither: 0.5,
     layer: 0,
     half: 0,
+    optics: Optics::PINHOLE,
 };
 
 fn subject() -> Subject {
@@ -109,20 +110,21 @@ fn the_format_is_as_documented() {
     let version = env!("CARGO_PKG_VERSION").split('.').map(|n| n.parse().unwrap());
     let mut expected = b"hyfilm\r\x1a".to_vec();
     // Tile 4 is whole, tile 14 has the last five columns and four rows.
-    let length = 128 + 8 + (64 + 5 * 4) * 24 + 8;
-    expected.extend([1u32, 128].iter().flat_map(|n| n.to_le_bytes()));
+    let length = 152 + 8 + (64 + 5 * 4) * 24 + 8;
+    expected.extend([2u32, 152].iter().flat_map(|n| n.to_le_bytes()));
     expected.extend([length as u64, 77, 5].iter().flat_map(|n| n.to_le_bytes()));
     expected.extend(version.chain([2u32, 37, 20, 3, 4, 1]).flat_map(u32::to_le_bytes));
     expected.extend((-32i32).to_le_bytes());
     let floats = [0.25f32, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 40.0, 0.5];
     expected.extend(floats.iter().flat_map(|x| x.to_le_bytes()));
-    assert_eq!(expected.len(), 128);
+    expected.extend([0u8; 24]);
+    assert_eq!(expected.len(), 152);
     expected.extend((1u64 << 4 | 1 << 14).to_le_bytes());
-    assert_eq!(bytes[..136], expected);
+    assert_eq!(bytes[..160], expected);
     assert_eq!(bytes.len(), length);
     let sum = |tile: u64, n: u64| (n + 1000 * tile).wrapping_mul(0x9e37_79b9_7f4a_7c15).to_le_bytes();
-    assert_eq!(bytes[136..144], sum(4, 0));
-    assert_eq!(bytes[136 + 64 * 24..][..16], [sum(14, 0), sum(14, 1)].concat());
+    assert_eq!(bytes[160..168], sum(4, 0));
+    assert_eq!(bytes[160 + 64 * 24..][..16], [sum(14, 0), sum(14, 1)].concat());
 }
 
 #[test]
@@ -183,6 +185,12 @@ fn another_picture_is_named() {
         Frame { up: [1.0, 0.0, 0.0], ..FRAME },
         Frame { fov_y_degrees: 41.0, ..FRAME },
         Frame { hither: 0.0, ..FRAME },
+        Frame { optics: Optics { projection: 2, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { height: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { radius: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { focus: 1.0, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { blades: 5, ..FRAME.optics }, ..FRAME },
+        Frame { optics: Optics { rotation_degrees: 1.0, ..FRAME.optics }, ..FRAME },
     ] {
         check(77, frame, "another camera");
     }
@@ -197,7 +205,7 @@ fn another_picture_is_named() {
         bytes[at] = before;
     };
     refused(0, "this is no film");
-    refused(8, "its format is version 2, and this program reads version 1");
+    refused(8, "its format is version 3, and this program reads version 2");
     refused(48, concat!("and not ", env!("CARGO_PKG_VERSION")));
 }
 
@@ -352,7 +360,7 @@ proptest! {
         let rest: Vec<u8> = (0..(own as i64 + more.unwrap_or(0)).max(0)).map(|n| n as u8).collect();
         let header = FileHeader {
             kept: kept.unwrap_or(bits.count_ones()),
-            file_bytes: (128 + 8 + rest.len() + 8) as u64,
+            file_bytes: (152 + 8 + rest.len() + 8) as u64,
             ..FileHeader::of(&subject())
         };
         let bytes = sealed(header, bits, &rest);

@@ -19,7 +19,7 @@ use gltf::camera::Projection;
 use gltf::khr_lights_punctual::Kind;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
-use hybray_shading::{Light, LightKind};
+use hybray_shading::{self as shading, Light, LightKind};
 use materials::Placed;
 
 pub(super) use materials::picture_file;
@@ -523,9 +523,12 @@ impl Reader<'_> {
 
     fn camera(&mut self, node: &gltf::Node<'_>, camera: &gltf::Camera<'_>, place: &Place) {
         let name = camera.name().or(node.name()).map_or_else(|| format!("camera {}", camera.index()), str::to_owned);
-        let Projection::Perspective(perspective) = camera.projection() else {
-            self.warn(&format!("the camera {} is orthographic, and left out", quote(&name)));
-            return;
+        let (projection, fov_y_degrees, height) = match camera.projection() {
+            Projection::Perspective(camera) => (shading::Projection::Perspective, camera.yfov().to_degrees(), None),
+            // Half of what it shows; the width follows from the picture's shape, as it does for a perspective one.
+            Projection::Orthographic(camera) => {
+                (shading::Projection::Orthographic, 45.0, Some(2.0 * camera.ymag().abs()))
+            }
         };
         let eye = place.point([0.0; 3]);
         let ahead = place.unit([0.0, 0.0, -1.0]);
@@ -536,9 +539,12 @@ impl Reader<'_> {
             eye,
             target: [0, 1, 2].map(|i| eye[i] + ahead[i] * far),
             up: place.unit([0.0, 1.0, 0.0]),
-            fov_y_degrees: perspective.yfov().to_degrees(),
+            fov_y_degrees,
             hither: 0.0,
             size: None,
+            projection,
+            height,
+            ..CameraSpec::default()
         });
     }
 

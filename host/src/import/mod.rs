@@ -30,7 +30,7 @@ pub use validate::{PRIMITIVES_MAX, SIZE_MAX, validate};
 
 pub(crate) use polygon::unit;
 pub(crate) use scene_toml::load_cameras;
-pub(crate) use validate::cone_bounds;
+pub(crate) use validate::{camera as validate_camera, cone_bounds};
 
 use crate::builtin;
 use crate::model::Model;

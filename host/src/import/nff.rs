@@ -311,7 +311,7 @@ fn view<R: BufRead>(words: &mut Words<R>, warnings: &mut Warnings, views: usize)
         return Err(ImportError::at(words.lines.file(), line, problem, "give from, at, up, angle, hither, resolution"));
     };
     let name = if views == 0 { "view".to_owned() } else { format!("view{}", views + 1) };
-    let camera = CameraSpec { name, eye, target, up, fov_y_degrees, hither, size };
+    let camera = CameraSpec { name, eye, target, up, fov_y_degrees, hither, size, ..CameraSpec::default() };
     validate::camera(&camera).map_err(|(p, r)| ImportError::at(words.lines.file(), line, p, r))?;
     Ok(camera)
 }
@@ -372,6 +372,7 @@ p 5 0 0 0 4 0 0 4 4 0 1 1 0 0 4 0
                     fov_y_degrees: 45.0,
                     hither: 0.01,
                     size: Some([512, 256]),
+                    ..CameraSpec::default()
                 }]
             );
             assert_eq!(m.background, [0.078, 0.361, 0.753]);

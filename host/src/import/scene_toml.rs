@@ -14,7 +14,7 @@ use super::toml_values::{Maybe, Source};
 use super::transform::Transform;
 use super::{Format, MODELS, builtin_model, mtl, open, validate};
 use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
-use hybray_shading::{Highlight, Light, LightKind, Map, Maps, Material};
+use hybray_shading::{Highlight, Light, LightKind, Map, Maps, Material, Projection};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::ops::Range;
@@ -436,6 +436,42 @@ impl<'a> Builder<'a> {
             Some(up) => source.numbers(up, "up", "[0, 1, 0]")?,
             None => [0.0, 1.0, 0.0],
         };
+        let projection = match &table.projection {
+            Some(given) => {
+                let name = one_of(source, given, "projection", &Projection::NAMES)?;
+                Projection::parse(name).unwrap_or_default()
+            }
+            None => Projection::Perspective,
+        };
+        // Keys that say something of some projections only; given to others, the file means something else.
+        let (is_lens, is_flat) = (projection == Projection::Perspective, projection == Projection::Orthographic);
+        for (key, at, fits) in [
+            ("fov", table.fov.as_ref().map(Spanned::span), is_lens),
+            ("height", table.height.as_ref().map(Spanned::span), is_flat),
+            ("aperture", table.aperture.as_ref().map(Spanned::span), is_lens),
+            ("focus", table.focus.as_ref().map(Spanned::span), is_lens),
+            ("blades", table.blades.as_ref().map(Spanned::span), is_lens),
+            ("blade_rotation", table.blade_rotation.as_ref().map(Spanned::span), is_lens),
+        ] {
+            if let (Some(at), false) = (at, fits) {
+                let problem = format!("`{key}` means nothing for a camera that is {}", projection.name());
+                return Err(source.error(at, problem, "leave it out, or choose another projection"));
+            }
+        }
+        let blades = match &table.blades {
+            Some(given) => match source.whole(given, "blades", 0..17, "6")? {
+                1 | 2 => {
+                    let recipe = "give 3 to 16, or 0 for a round opening";
+                    return Err(source.error(given.span(), "an opening of 1 or 2 blades is none", recipe));
+                }
+                blades => blades as u8,
+            },
+            None => 0,
+        };
+        let length = |given: &Maybe<f64>, key| {
+            let given = given.as_ref();
+            given.map(|given| source.number(given, key, |l| l > 0.0, "more than 0, for example 2")).transpose()
+        };
         let angle = |a: f32| a > 0.0 && a < 180.0;
         let camera = CameraSpec {
             name,
@@ -451,6 +487,18 @@ impl<'a> Builder<'a> {
             )?,
             hither: source.number_or(&table.hither, "hither", 0.0, |h| h >= 0.0, "0 and up")?,
             size: table.size.as_ref().map(|s| source.size(s, "size")).transpose()?,
+            projection,
+            height: length(&table.height, "height")?,
+            aperture: source.number_or(&table.aperture, "aperture", 0.0, |a| a >= 0.0, "0 and up, for example 0.05")?,
+            focus: length(&table.focus, "focus")?,
+            blades,
+            blade_rotation_degrees: source.number_or(
+                &table.blade_rotation,
+                "blade_rotation",
+                0.0,
+                |_| true,
+                "degrees, for example 15",
+            )?,
         };
         validate::camera(&camera).map_err(|(p, r)| source.error(span, p, r))?;
         Ok(camera)

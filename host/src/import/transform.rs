@@ -72,6 +72,9 @@ impl Transform {
         for camera in &mut model.cameras {
             (camera.eye, camera.target) = (self.point(camera.eye), self.point(camera.target));
             (camera.up, camera.hither) = (self.unit(camera.up), self.length(camera.hither));
+            (camera.height, camera.focus) =
+                (camera.height.map(|l| self.length(l)), camera.focus.map(|l| self.length(l)));
+            camera.aperture = self.length(camera.aperture);
         }
         model.lights.iter_mut().for_each(|light| self.light(light));
     }
@@ -147,7 +150,10 @@ mod tests {
         m.cones.push(Cone { base, base_radius: 1.0, apex, apex_radius: 0.5, material: 0 });
         let (eye, target, up) = ([1.0, 0.0, 0.0], [0.0; 3], [0.0, 1.0, 0.0]);
         let (fov_y_degrees, hither, size) = (40.0, 1.0, None);
-        m.cameras.push(CameraSpec { name: String::new(), eye, target, up, fov_y_degrees, hither, size });
+        let (height, aperture, focus) = (Some(3.0), 0.5, Some(4.0));
+        let name = String::new();
+        let camera = CameraSpec { name, eye, target, up, fov_y_degrees, hither, size, ..CameraSpec::default() };
+        m.cameras.push(CameraSpec { height, aperture, focus, ..camera });
         let axis = [1.0, 0.0, 0.0];
         let kind = LightKind::Spot as u32;
         m.lights.push(Light {

@@ -8,7 +8,7 @@ use super::COORDINATE_MAX;
 use super::error::{ImportError, quote};
 use super::polygon::unit;
 use crate::model::{CameraSpec, Cone, Model, Sphere};
-use hybray_shading::{Light, LightKind, Material};
+use hybray_shading::{Lens, Light, LightKind, Material, Projection};
 
 /// Primitives that a model may have: their ids leave one bit of an `u32` free.
 pub const PRIMITIVES_MAX: u64 = (1 << 31) - 1;
@@ -201,9 +201,18 @@ pub(crate) fn light(l: &Light) -> Result<(), Complaint> {
     Ok(())
 }
 
+/// An opening is at most so many times as far across from the middle as what is sharp is away: less than nodes would take, so
+/// that rounding does not matter.
+const APERTURE_MAX: f32 = 1000.0;
+
 /// A camera by itself.
 pub(crate) fn camera(c: &CameraSpec) -> Result<(), Complaint> {
-    if ![c.eye, c.target, c.up].iter().all(|v| in_range(v)) || !in_range(&[c.hither]) {
+    // What is not used may be anything that a file can say, but not what a projection makes of the rest.
+    let is_flat = c.projection == Projection::Orthographic;
+    let height = if is_flat { c.picture_height() } else { c.height.unwrap_or(1.0) };
+    let focus = if c.aperture > 0.0 { c.focus_distance() } else { c.focus.unwrap_or(1.0) };
+    let lengths = [c.hither, c.aperture, height, focus, c.blade_rotation_degrees];
+    if ![c.eye, c.target, c.up].iter().all(|v| in_range(v)) || !in_range(&lengths) {
         return complaint("the camera's numbers are not finite or beyond 2^100", "scale the scene down");
     }
     if c.eye == c.target {
@@ -219,6 +228,30 @@ pub(crate) fn camera(c: &CameraSpec) -> Result<(), Complaint> {
     }
     if c.hither < 0.0 {
         return complaint(format!("the camera's hither is {}", c.hither), "give 0 and up");
+    }
+    if height <= 0.0 {
+        return complaint(format!("the height of the camera's picture is {height}"), "give more than 0");
+    }
+    if c.aperture < 0.0 {
+        return complaint(
+            format!("the camera's aperture is {}", c.aperture),
+            "give the radius of its lens, or 0 for none",
+        );
+    }
+    if focus <= 0.0 || c.aperture / focus > APERTURE_MAX {
+        let problem = format!("the camera's aperture is {} and its focus {focus}", c.aperture);
+        return complaint(
+            problem,
+            format!("give a focus of more than 0, and an aperture of at most {APERTURE_MAX} times that"),
+        );
+    }
+    if c.aperture > 0.0 && c.projection != Projection::Perspective {
+        let problem = format!("an aperture means nothing for a camera that is {}", c.projection.name());
+        return complaint(problem, "leave it out, or make the camera perspective");
+    }
+    if matches!(c.blades, 1 | 2) || u32::from(c.blades) > Lens::BLADES_MAX {
+        let problem = format!("the camera's lens has {} blades", c.blades);
+        return complaint(problem, format!("give 3 to {}, or 0 for a round one", Lens::BLADES_MAX));
     }
     match c.size {
         Some(size) if size.iter().any(|&s| s == 0 || s > SIZE_MAX) => {
@@ -258,8 +291,7 @@ mod tests {
             target: [0.0; 3],
             up: [0.0, 1.0, 0.0],
             fov_y_degrees: 40.0,
-            hither: 0.0,
-            size: None,
+            ..CameraSpec::default()
         });
         model
     }
@@ -306,6 +338,17 @@ mod tests {
         check(|m| m.cameras[0].up = [0.0, 0.0, -2.0], "camera `front`: the camera's up");
         check(|m| m.cameras[0].fov_y_degrees = 180.0, "camera `front`: the camera's angle is 180");
         check(|m| m.cameras[0].hither = -1.0, "camera `front`: the camera's hither");
+        check(|m| m.cameras[0].height = Some(0.0), "camera `front`: the height of the camera's picture is 0");
+        check(|m| m.cameras[0].aperture = -1.0, "camera `front`: the camera's aperture is -1");
+        check(|m| m.cameras[0].focus = Some(0.0), "camera `front`: the camera's aperture is 0 and its focus 0");
+        check(|m| m.cameras[0].aperture = 6000.0, "camera `front`: the camera's aperture is 6000 and its focus 5");
+        check(|m| m.cameras[0].focus = Some(f32::NAN), "camera `front`: the camera's numbers");
+        check(
+            |m| (m.cameras[0].aperture, m.cameras[0].projection) = (1.0, Projection::Spherical),
+            "camera `front`: an aperture means nothing for a camera that is spherical",
+        );
+        check(|m| m.cameras[0].blades = 2, "camera `front`: the camera's lens has 2 blades");
+        check(|m| m.cameras[0].blades = 17, "camera `front`: the camera's lens has 17 blades");
         check(|m| m.cameras[0].size = Some([0, 5]), "camera `front`: the picture is 0 x 5");
         check(|m| m.background[0] = f32::NAN, "the scene: background");
     }

@@ -169,7 +169,7 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
             .collect(),
         uses,
         lights,
-        ..rest.into_model()
+        ..rest.into_model().ok_or_else(|| broken("a camera has a projection that is not known here"))?
     };
     import::validate(&model).map_err(|e| broken(e.to_string()))?;
     if model.cameras.is_empty() {

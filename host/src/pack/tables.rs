@@ -1,6 +1,7 @@
 //! What a packed scene holds beside pages, materials and lights: written with postcard.
 
 use crate::model::{CameraSpec, Model, Objects, Settings};
+use hybray_shading::Projection;
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -12,6 +13,13 @@ struct Camera {
     fov_y_degrees: f32,
     hither: f32,
     size: Option<[u32; 2]>,
+    /// The number of a [`Projection`].
+    projection: u8,
+    height: Option<f32>,
+    aperture: f32,
+    focus: Option<f32>,
+    blades: u8,
+    blade_rotation_degrees: f32,
 }
 
 /// The tables, in the order of the file. `docs/HYB.md` lists the fields: a change here is a new version there.
@@ -44,6 +52,12 @@ impl Rest {
             fov_y_degrees: c.fov_y_degrees,
             hither: c.hither,
             size: c.size,
+            projection: c.projection as u8,
+            height: c.height,
+            aperture: c.aperture,
+            focus: c.focus,
+            blades: c.blades,
+            blade_rotation_degrees: c.blade_rotation_degrees,
         });
         let Settings { size, spp, depth, cutoff, filter, exposure, seed } = model.settings.clone();
         let Objects { polygons, spheres, cones, cylinders } = model.objects;
@@ -64,27 +78,35 @@ impl Rest {
         }
     }
 
-    /// A model of it, without primitives, materials and lights.
-    pub fn into_model(self) -> Model {
+    /// A model of it, without primitives, materials and lights. `None` if a camera has a projection that is none.
+    pub fn into_model(self) -> Option<Model> {
         let Self { size, spp, depth, cutoff, filter, exposure, seed, .. } = self;
-        let cameras = self.cameras.into_iter().map(|c| CameraSpec {
-            name: c.name,
-            eye: c.eye,
-            target: c.target,
-            up: c.up,
-            fov_y_degrees: c.fov_y_degrees,
-            hither: c.hither,
-            size: c.size,
-        });
+        let camera = |c: Camera| {
+            Some(CameraSpec {
+                name: c.name,
+                eye: c.eye,
+                target: c.target,
+                up: c.up,
+                fov_y_degrees: c.fov_y_degrees,
+                hither: c.hither,
+                size: c.size,
+                projection: Projection::from_u32(c.projection.into())?,
+                height: c.height,
+                aperture: c.aperture,
+                focus: c.focus,
+                blades: c.blades,
+                blade_rotation_degrees: c.blade_rotation_degrees,
+            })
+        };
         let [polygons, spheres, cones, cylinders] = self.objects;
-        Model {
-            cameras: cameras.collect(),
+        Some(Model {
+            cameras: self.cameras.into_iter().map(camera).collect::<Option<_>>()?,
             background: self.background,
             ambient: self.ambient,
             settings: Settings { size, spp, depth, cutoff, filter, exposure, seed },
             objects: Objects { polygons, spheres, cones, cylinders },
             warnings: self.warnings,
             ..Model::default()
-        }
+        })
     }
 }

@@ -157,8 +157,7 @@ impl Pilot {
 
     fn trace_with(scene: &Scene<'_>, frame: &Frame, rays_max: u32, threads: usize) -> Option<Self> {
         let Frame { width, height, .. } = *frame;
-        let (eye, target, up) = (frame.eye.into(), frame.target.into(), frame.up.into());
-        let camera = Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, width, height).ok()?;
+        let camera = hybray_scheduler::camera(frame).ok()?;
         let map = TileMap::new(width, height)?;
         let tiles = map.len();
         if rays_max == 0 || tiles == 0 {

@@ -11,6 +11,7 @@ use hybray_geometry::simd::Kernels;
 use hybray_scene::{PAGE_BYTES_MAX, PageForm};
 use hybray_scheduler::policy::{Criterion, Policy, Tiles};
 use hybray_scheduler::{Options, Settings as NodeSettings};
+use hybray_shading::Projection;
 use hybray_simulated::{MACHINES, Machine, NODES_MAX};
 use hybray_wire::{BODY_BYTES_MAX, RayRecord};
 use std::path::PathBuf;
@@ -287,6 +288,31 @@ impl KernelChoice {
     }
 }
 
+/// Through which camera a scene is seen.
+#[derive(Debug, Args)]
+pub(super) struct CameraArgs {
+    /// Which of the scene's cameras
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// How it makes rays of pixels: `spherical` sees 360 x 180 degrees. Default: the camera's own
+    #[arg(long, value_parser = Projection::NAMES)]
+    pub projection: Option<String>,
+    /// What an orthographic picture shows from top to bottom, in the unit of the scene's file. Default: the camera's own, or as
+    /// much as a perspective one shows at what it looks at
+    #[arg(long, value_name = "LENGTH", value_parser = positive)]
+    pub height: Option<f32>,
+    /// Radius of the lens, in the unit of the scene's file: what is not in focus is blurred. 0: everything is sharp.
+    /// Default: the camera's own
+    #[arg(long, value_name = "RADIUS", value_parser = not_negative)]
+    pub aperture: Option<f32>,
+    /// Distance of what is in focus. Default: the camera's own, or that of what it looks at
+    #[arg(long, value_name = "DISTANCE", value_parser = positive)]
+    pub focus: Option<f32>,
+    /// Sides of the lens's opening, 3 to 16; 0: it is round. Default: the camera's own
+    #[arg(long, value_name = "N", value_parser = blades)]
+    pub blades: Option<u8>,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct RenderArgs {
     #[command(flatten)]
@@ -312,12 +338,11 @@ pub(super) struct RenderArgs {
     /// Radiance is multiplied by this before it is encoded
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
-    /// Which of the scene's cameras
-    #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
+    #[command(flatten)]
+    pub camera: CameraArgs,
     /// Draw the views of all cameras of this file, one after the other on the same nodes: TOML with `[[camera]]` tables as in
     /// scene files, each with a name. `out.png` becomes `out-NAME.png`
-    #[arg(long, value_name = "FILE", conflicts_with = "camera")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "projection", "height", "aperture", "focus", "blades"])]
     pub cameras: Option<PathBuf>,
     /// Channels to write beside red, green and blue, to an .exr
     #[arg(long, value_enum, value_name = "LAYER,..", value_delimiter = ',')]
@@ -479,9 +504,8 @@ pub(super) struct SimulateArgs {
     /// Ray depth, 1 to 64: 1 is what is seen directly and its shadows
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     pub depth: Option<u32>,
-    /// Which of the scene's cameras
-    #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
+    #[command(flatten)]
+    pub camera: CameraArgs,
     /// Seed of every random choice
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -556,9 +580,8 @@ pub(super) struct ConvertArgs {
     pub scene: SceneArgs,
     /// What to write: .nff, .obj or .pov
     pub output: PathBuf,
-    /// Which of the scene's cameras
-    #[arg(long, value_name = "NAME")]
-    pub camera: Option<String>,
+    #[command(flatten)]
+    pub camera: CameraArgs,
     /// Columns and rows, pixels, for formats that say so
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
@@ -583,6 +606,17 @@ pub(super) struct CompareArgs {
 
 fn pixels_per_degree(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|n| (1.0..=1000.0).contains(n)).ok_or_else(|| "give a number from 1 to 1000".to_owned())
+}
+
+fn not_negative(text: &str) -> Result<f32, String> {
+    number(text, "of 0 or more, such as 0.05", |x| x >= 0.0 && x.is_finite())
+}
+
+fn blades(text: &str) -> Result<u8, String> {
+    match text.parse() {
+        Ok(blades @ (0 | 3..=16)) => Ok(blades),
+        _ => Err("give 3 to 16, or 0 for a round opening".to_owned()),
+    }
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

@@ -20,7 +20,7 @@ mod trace;
 mod views;
 
 use anyhow::{Context, Result, anyhow, bail};
-use args::{Cli, SceneArgs, TreeArgs, Verb};
+use args::{CameraArgs, Cli, SceneArgs, TreeArgs, Verb};
 use clap::{CommandFactory, Parser};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -31,6 +31,7 @@ use crate::model::{CameraSpec, Model};
 use crate::pack::is_packed;
 use crate::prepare::Prepared;
 use crate::{build, framing, import};
+use hybray_shading::Projection;
 
 /// How a command ended well.
 enum End {
@@ -141,13 +142,51 @@ fn prepare(args: &SceneArgs, tree: &TreeArgs, size: Option<[u32; 2]>, page_bytes
     Ok((prepared, start.elapsed()))
 }
 
-/// The camera called `name`, or the first.
-fn camera<'a>(cameras: &'a [CameraSpec], name: Option<&str>) -> Result<&'a CameraSpec> {
-    let Some(name) = name else {
-        return cameras.first().context("the scene has nothing that a camera could look at");
+/// The camera that was asked for by name, or the first, with what else was asked of it.
+fn camera(cameras: &[CameraSpec], args: &CameraArgs) -> Result<CameraSpec> {
+    let mut camera = match &args.camera {
+        None => cameras.first().context("the scene has nothing that a camera could look at")?,
+        Some(name) => cameras.iter().find(|camera| camera.name == *name).ok_or_else(|| {
+            let names: Vec<_> = cameras.iter().map(|camera| format!("`{}`", camera.name)).collect();
+            anyhow!("the scene has no camera `{name}`; it has {}", names.join(", "))
+        })?,
+    }
+    .clone();
+    if let Some(projection) = args.projection.as_deref().and_then(Projection::parse)
+        && projection != camera.projection
+    {
+        // A lens and a picture's shape belong to the projection that they were given for.
+        camera = CameraSpec { projection, aperture: 0.0, size: None, ..camera };
+    }
+    camera.height = args.height.or(camera.height);
+    camera.aperture = args.aperture.unwrap_or(camera.aperture);
+    camera.focus = args.focus.or(camera.focus);
+    camera.blades = args.blades.unwrap_or(camera.blades);
+    let means_nothing = |option: &str, only: Projection| {
+        anyhow!(
+            "{option} means nothing for a camera that is {}: give --projection {}",
+            camera.projection.name(),
+            only.name()
+        )
     };
-    cameras.iter().find(|camera| camera.name == name).ok_or_else(|| {
-        let names: Vec<_> = cameras.iter().map(|camera| format!("`{}`", camera.name)).collect();
-        anyhow!("the scene has no camera `{name}`; it has {}", names.join(", "))
-    })
+    let (flat, perspective) = (Projection::Orthographic, Projection::Perspective);
+    if args.height.is_some() && camera.projection != flat {
+        return Err(means_nothing("--height", flat));
+    }
+    for (option, is_given) in [
+        ("--aperture", args.aperture.is_some()),
+        ("--focus", args.focus.is_some()),
+        ("--blades", args.blades.is_some()),
+    ] {
+        if is_given && camera.projection != perspective {
+            return Err(means_nothing(option, perspective));
+        }
+    }
+    if camera.aperture == 0.0 && (args.focus.is_some() || args.blades.is_some()) {
+        bail!("--focus and --blades mean nothing without a lens: give --aperture, such as --aperture {}", {
+            camera.focus_distance() / 64.0
+        });
+    }
+    import::validate_camera(&camera).map_err(|(problem, remedy)| anyhow!("{problem}: {remedy}"))?;
+    Ok(camera)
 }

@@ -23,7 +23,6 @@ use hybray_native::{DispatcherAt, Farm, NODES_MAX, PICTURES_MAX, Traced, Worked,
 use hybray_scene::PAGE_BYTES_MAX;
 use hybray_scheduler::policy::Policy;
 use hybray_scheduler::{NodeReport, Outcome, Settings as NodeSettings, Sizes};
-use hybray_shading::Camera;
 use hybray_wire::Frame;
 use std::cell::OnceCell;
 use std::io::ErrorKind;
@@ -76,7 +75,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         let (model, import_time) = load(&args.scene, args.size)?;
         say(&model.warnings, model.primitives() as u64);
         if views.is_none() {
-            camera(&model.cameras, args.camera.as_deref())?;
+            camera(&model.cameras, &args.camera)?;
         }
         if interrupted.load(Ordering::Relaxed) {
             return stopped_early(&show);
@@ -85,7 +84,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     };
     let views = match views {
         Some(views) => views,
-        None => vec![View::one(&path, format, camera(&prepared.cameras, args.camera.as_deref())?)],
+        None => vec![View::one(&path, format, &camera(&prepared.cameras, &args.camera)?)],
     };
     if interrupted.load(Ordering::Relaxed) {
         return stopped_early(&show);
@@ -470,8 +469,7 @@ pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
 /// Nodes pass over a picture whose camera is none, so it is not sent to them: coordinates that are scaled with a tiny scene
 /// may leave the range of `f32`.
 pub(super) fn check_camera(frame: &Frame) -> Result<()> {
-    let [eye, target, up] = [frame.eye, frame.target, frame.up].map(Into::into);
-    Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height)
+    hybray_scheduler::camera(frame)
         .map_err(|error| anyhow!("{error}, in the scene's own unit: bring it nearer, or make the scene larger"))?;
     Ok(())
 }

@@ -42,7 +42,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<End> {
     let (mut prepared, _) = prepare(&args.scene, &args.tree, args.size, page_bytes)?;
     prepared.warnings.iter().for_each(|warning| show.line(&format!("warning: {warning}")));
     show.line(&format!("{}: {} primitives", args.scene.scene, prepared.primitives.iter().sum::<u64>()));
-    let camera = camera(&prepared.cameras, args.camera.as_deref())?.clone();
+    let camera = camera(&prepared.cameras, &args.camera)?;
     let wanted = Settings { size: args.size, spp: args.spp, depth: args.depth, seed: args.seed, ..Settings::default() };
     let frame = prepared.frame(&camera, &wanted);
     check_camera(&frame)?;

@@ -112,6 +112,15 @@ fn cameras() {
     let folder = &folder();
     check(folder, 1, "render -q sphere.nff -o a.png --camera left", &["no camera `left`", "it has `"]);
     check(folder, 1, "convert sphere.nff a.pov --camera left", &["no camera `left`", "it has `"]);
+    check(folder, 2, "render -q sphere.nff -o a.png --projection flat", &["flat", "orthographic, spherical"]);
+    check(folder, 2, "render -q sphere.nff -o a.png --aperture 0.1 --blades 2", &["--blades", "3 to 16, or 0"]);
+    check(folder, 2, "render -q sphere.nff -o a.png --aperture=-1", &["--aperture", "0 or more"]);
+    check(folder, 1, "render -q sphere.nff -o a.png --focus 2", &["nothing without a lens", "--aperture 0.0"]);
+    check(folder, 1, "render -q sphere.nff -o a.png --height 2", &["--height", "give --projection orthographic"]);
+    let wide = "render -q sphere.nff -o a.png --projection spherical --aperture 0.1";
+    check(folder, 1, wide, &["--aperture", "give --projection perspective"]);
+    let near = "render -q sphere.nff -o a.png --aperture 1 --focus 0.0001";
+    check(folder, 1, near, &["aperture is 1 and its focus 0.0001", "at most 1000 times"]);
     check(folder, 1, "render -q far.nff -o a.png", &["camera", "bring it nearer"]);
 }
 

@@ -28,6 +28,7 @@ const FRAME: Frame = Frame {
     hither: 0.0,
     layer: 0,
     half: 0,
+    optics: hybray_wire::Optics::PINHOLE,
 };
 
 /// A scene of these directory nodes, without pages.

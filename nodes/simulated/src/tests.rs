@@ -23,6 +23,7 @@ const FRAME: Frame = Frame {
     hither: 0.0,
     layer: 0,
     half: 0,
+    optics: hybray_wire::Optics::PINHOLE,
 };
 
 fn sky() -> Scene<'static> {

@@ -155,6 +155,7 @@ impl Toy {
             hither: 0.0,
             layer: 0,
             half: 0,
+            optics: hybray_wire::Optics::PINHOLE,
         }
     }
 }

@@ -79,6 +79,7 @@ fn begin(tiles: u32) -> Message {
         hither: 0.0,
         layer: 0,
         half: 0,
+        optics: hybray_wire::Optics::PINHOLE,
     })
 }
 

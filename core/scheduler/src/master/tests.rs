@@ -50,6 +50,7 @@ const FRAME: Frame = Frame {
     hither: 0.0,
     layer: 0,
     half: 0,
+    optics: hybray_wire::Optics::PINHOLE,
 };
 
 fn say(master: &mut Master<'_>, from: Peer, message: Message) {

@@ -126,20 +126,15 @@ pub(crate) fn clip(
     scratch: &mut wide::Scratch,
     counts: &mut Counts,
 ) -> Cliplist {
-    // The corners' rays: what is looked for are pages, and a page more or less harms nothing.
+    // Half a pixel more or less, as a filter has it, is a page more or less, and harms nothing.
     let (a, b) = (picture.map.tile(first), picture.map.tile(first + count - 1));
-    let corner = |x: u32, y: u32, offset: [f32; 2]| {
-        let seen = picture.camera.ray(x, y, offset);
-        Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY }
-    };
-    let (right, below) = (b.x + b.width - 1, b.y + b.height - 1);
-    let rays = [
-        corner(a.x, a.y, [0.0, 0.0]),
-        corner(right, a.y, [1.0, 0.0]),
-        corner(a.x, below, [0.0, 1.0]),
-        corner(right, below, [1.0, 1.0]),
-    ];
-    let Some(bundle) = Bundle::around(rays.iter(), scene.magnitude) else { return Cliplist::new() };
+    let rays = picture.camera.outermost([a.x, a.y], [b.x + b.width - 1, b.y + b.height - 1]).map(|seen| Ray {
+        origin: seen.origin,
+        direction: seen.direction,
+        t_min: seen.t_min,
+        t_max: f32::INFINITY,
+    });
+    let Some(bundle) = Bundle::around(rays, scene.magnitude) else { return Cliplist::new() };
     let mut found = [(0.0, 0); CLIPLIST_MAX];
     let used = wide::pages(kernels, &scene.resident.directory, &bundle, &mut found, scratch, counts);
     found[..used].iter().map(|&(_, page)| page).collect()

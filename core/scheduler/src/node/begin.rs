@@ -9,7 +9,7 @@ use hybray_geometry::Ray;
 use hybray_link::Peer;
 use hybray_pyraclip::wide;
 use hybray_scene::Pages;
-use hybray_shading::{id, sample_offset};
+use hybray_shading::id;
 use hybray_tracer::{Scene, Walker};
 use hybray_wire::{RayKind, RayRecord, TILE};
 
@@ -37,11 +37,9 @@ pub(super) struct InWork {
 
 /// The primary rays of one sample.
 pub(super) fn start_sample(picture: &Picture, sample: u16, places: &[Place], rays: &mut [Ray]) {
-    let frame = &picture.frame;
+    let (seed, samples) = (picture.frame.seed, u32::from(picture.frame.samples));
     for (place, ray) in places.iter().zip(rays) {
-        let pixel_id = id::pixel_id(frame.seed, place.y * frame.width + place.x);
-        let offset = sample_offset(picture.filter, pixel_id, u32::from(sample), u32::from(frame.samples));
-        let seen = picture.camera.ray(place.x, place.y, offset);
+        let seen = picture.camera.sample(picture.filter, seed, [place.x, place.y], u32::from(sample), samples);
         *ray = Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY };
     }
 }

@@ -21,7 +21,7 @@ mod tiles;
 mod way;
 
 pub use memory::{Limits, NodeMemory};
-pub use picture::can_draw;
+pub use picture::{camera, can_draw};
 pub use store::{All, Backing, Cache, Charged, Landed, Own, Place as CachePlace, Store};
 
 pub(crate) use ahead::clip;

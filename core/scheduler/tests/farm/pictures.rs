@@ -5,9 +5,9 @@ use hybray_bintree::walk::Stack;
 use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray};
 use hybray_scheduler::{Fixed, Step};
-use hybray_shading::{Camera, Filter, id, sample_offset};
+use hybray_shading::{Filter, id};
 use hybray_tracer::{HitRecord, Lane, Origin, Scene, Sink, Together, Walker};
-use hybray_wire::{Counts, Frame, RayRecord, TileMap};
+use hybray_wire::{Counts, Frame, Optics, RayRecord, TileMap};
 use std::sync::OnceLock;
 
 /// A picture, its sums and its cost.
@@ -43,10 +43,7 @@ impl Sink for Pixel {
 impl Picture {
     fn new(scene: Scene<'static>, frame: Frame) -> Self {
         let map = TileMap::new(frame.width, frame.height).unwrap();
-        let up = frame.up.into();
-        let (eye, target) = (frame.eye.into(), frame.target.into());
-        let camera =
-            Camera::look(eye, target, up, frame.fov_y_degrees, frame.hither, frame.width, frame.height).unwrap();
+        let camera = hybray_scheduler::camera(&frame).unwrap();
         let filter = Filter::from_u32(u32::from(frame.filter)).unwrap();
         let (mut stack, mut together) = (Stack::new(), Together::new());
         let mut records = vec![HitRecord::EMPTY; 64];
@@ -58,8 +55,7 @@ impl Picture {
             let (x, y) = (pixel % frame.width, pixel / frame.width);
             let mut sink = Pixel { step: Step::new(frame.step_log2), sum: [0; 3], rays: 0 };
             for sample in 0..u32::from(frame.samples) {
-                let offset = sample_offset(filter, id::pixel_id(frame.seed, pixel), sample, u32::from(frame.samples));
-                let seen = camera.ray(x, y, offset);
+                let seen = camera.sample(filter, frame.seed, [x, y], sample, u32::from(frame.samples));
                 let ray =
                     Ray { origin: seen.origin, direction: seen.direction, t_min: seen.t_min, t_max: f32::INFINITY };
                 let record = RayRecord {
@@ -102,14 +98,22 @@ impl Picture {
     }
 }
 
-/// Five small pictures of the toy, with whole squares, strips of one tile, and tiles that are cut off.
+/// Five small pictures of the toy, with whole squares, strips of one tile, and tiles that are cut off, through all
+/// kinds of cameras.
 pub fn toys() -> &'static [Picture; 5] {
     static TOYS: OnceLock<[Picture; 5]> = OnceLock::new();
     TOYS.get_or_init(|| {
         let toy: &'static Toy = Box::leak(Box::new(Toy::new()));
         let pages = Box::leak(Box::new(toy.open()));
-        let sizes = [(1, 1, 3), (16, 16, 2), (39, 17, 1), (64, 44, 1), (100, 8, 1)];
-        sizes.map(|(width, height, samples)| Picture::new(toy.scene(pages), Toy::frame(width, height, samples)))
+        let pinhole = Optics::PINHOLE;
+        let lens = Optics { radius: 0.2, focus: 4.0, blades: 6, rotation_degrees: 15.0, ..pinhole };
+        let parallel = Optics { projection: 1, height: 2.0, ..pinhole };
+        let around = Optics { projection: 2, ..pinhole };
+        let sizes =
+            [(1, 1, 3, pinhole), (16, 16, 2, lens), (39, 17, 1, around), (64, 44, 1, pinhole), (100, 8, 1, parallel)];
+        sizes.map(|(width, height, samples, optics)| {
+            Picture::new(toy.scene(pages), Frame { optics, ..Toy::frame(width, height, samples) })
+        })
     })
 }
 

@@ -51,6 +51,7 @@ fn empty(name: &str, eye: V, target: V, fov_y_degrees: f32, size: [u32; 2]) -> M
         fov_y_degrees,
         hither: 0.0,
         size: Some(size),
+        ..CameraSpec::default()
     };
     Model { cameras: vec![camera], settings: Settings { depth: Some(5), ..Settings::default() }, ..Model::default() }
 }

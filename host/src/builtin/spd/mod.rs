@@ -63,6 +63,7 @@ fn scene(view: &View, lights: &[V]) -> Model {
         fov_y_degrees: view.fov_degrees,
         hither: view.hither,
         size: Some([512, 512]),
+        ..CameraSpec::default()
     };
     Model {
         lights: lights.iter().map(light).collect(),

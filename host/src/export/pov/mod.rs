@@ -26,10 +26,11 @@ mod texture;
 use std::fmt;
 use std::io::{self, Write};
 
-use hybray_shading::{Light, LightKind, Material};
+use hybray_shading::{Light, LightKind, Material, Projection};
 
 use self::texture::texture;
 use super::{DEFAULT_DEPTH, Notes, extent, material_label};
+use crate::framing::basis;
 use crate::model::{CameraSpec, Mesh, Model};
 
 /// A number in the fewest digits: those of `f32` where it is one, and else those of `f64`.
@@ -124,21 +125,66 @@ fn header(model: &Model, camera: &CameraSpec, scale: f64, exposure: f64, to: &mu
     writeln!(to, "background {{ color rgb {} }}", Angled::times(model.background, exposure))
 }
 
+/// Rays through the lens for each pixel.
+const BLUR_SAMPLES: u32 = 200;
+
 fn view(camera: &CameraSpec, scale: f64, to: &mut dyn Write, notes: &mut Notes) -> io::Result<()> {
     if camera.hither > 0.0 {
         notes.add("POV-Ray shows what is nearer than the hither distance", "the camera");
     }
+    // The minus at `right` makes the view right-handed: POV-Ray's x is left unless told.
+    let place = |to: &mut dyn Write| {
+        writeln!(to, "  sky {}", Angled::times(camera.up, 1.0))?;
+        writeln!(to, "  look_at {}", Angled::times(camera.target, scale))
+    };
+    writeln!(to, "camera {{")?;
+    match camera.projection {
+        Projection::Perspective => {}
+        Projection::Orthographic => {
+            let height = f64::from(camera.picture_height()) * scale;
+            writeln!(to, "  orthographic")?;
+            writeln!(to, "  location {}", Angled::times(camera.eye, scale))?;
+            writeln!(to, "  up y*{height}")?;
+            writeln!(to, "  right -x*{height}*image_width/image_height")?;
+            place(to)?;
+            return writeln!(to, "}}");
+        }
+        Projection::Spherical => {
+            // Turned around `right` and then `up` from `direction`: both are the other way round for rows to go down and
+            // columns to the right, and a `look_at` would put one of them back.
+            let [right, above, back] = basis(camera).unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+            writeln!(to, "  spherical")?;
+            writeln!(to, "  location {}", Angled::times(camera.eye, scale))?;
+            writeln!(to, "  direction {}", Angled(back.map(|c| -c)))?;
+            writeln!(to, "  up {}", Angled(above.map(|c| -c)))?;
+            writeln!(to, "  right {}", Angled(right.map(|c| -c)))?;
+            writeln!(to, "  angle 360 180")?;
+            return writeln!(to, "}}");
+        }
+    }
     // The picture is 1 high at this distance. An `angle` would be that from left to right, and so would change with the
-    // picture's shape. The minus makes the view right-handed: POV-Ray's x is left unless told.
+    // picture's shape.
     let half = f64::from(camera.fov_y_degrees) * (std::f64::consts::PI / 360.0);
     let distance = 0.5 / libm::tan(half);
-    writeln!(to, "camera {{")?;
     writeln!(to, "  location {}", Angled::times(camera.eye, scale))?;
     writeln!(to, "  direction z*{distance}")?;
     writeln!(to, "  up y")?;
     writeln!(to, "  right -x*image_width/image_height")?;
-    writeln!(to, "  sky {}", Angled::times(camera.up, 1.0))?;
-    writeln!(to, "  look_at {}", Angled::times(camera.target, scale))?;
+    place(to)?;
+    if camera.aperture > 0.0 {
+        if camera.blades > 0 {
+            notes.add("POV-Ray's lens is round", "the camera");
+        }
+        // A point on the plane that is sharp.
+        let view = [0, 1, 2].map(|i| f64::from(camera.target[i]) - f64::from(camera.eye[i]));
+        let length = view.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let focus = along(camera.eye.map(f64::from), view, f64::from(camera.focus_distance()) / length);
+        // Twice the diameter: POV-Ray's samples fill a circle of half of what it is told.
+        writeln!(to, "  aperture {}", 4.0 * f64::from(camera.aperture) * scale)?;
+        writeln!(to, "  focal_point {}", Angled(focus.map(|c| c * scale)))?;
+        writeln!(to, "  blur_samples {BLUR_SAMPLES}")?;
+        writeln!(to, "  variance 0")?;
+    }
     writeln!(to, "}}")
 }
 

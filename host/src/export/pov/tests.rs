@@ -224,11 +224,26 @@ impl Tracer<'_> {
         let depth = self.model.settings.depth.unwrap_or(DEFAULT_DEPTH);
         let mut all = Vec::new();
         for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-            let pixel = 2.0 * half / f64::from(height);
-            let across = (f64::from(x) + 0.5 - f64::from(width) / 2.0) * pixel;
-            let above = (f64::from(height) / 2.0 - f64::from(y) - 0.5) * pixel;
-            let direction = unit(add(add(forward, right, across), up, above));
-            all.extend(self.trace(wide(camera.eye), direction, depth, None));
+            // Of the picture's height.
+            let across = (f64::from(x) + 0.5 - f64::from(width) / 2.0) / f64::from(height);
+            let above = 0.5 - (f64::from(y) + 0.5) / f64::from(height);
+            let from = |right_by: f64, up_by: f64, start: V| add(add(start, right, right_by), up, up_by);
+            let eye = wide(camera.eye);
+            let (origin, direction) = match camera.projection {
+                Projection::Perspective => (eye, from(2.0 * half * across, 2.0 * half * above, forward)),
+                Projection::Orthographic => {
+                    let size = f64::from(camera.picture_height());
+                    (from(size * across, size * above, eye), forward)
+                }
+                Projection::Spherical => {
+                    let turn = std::f64::consts::TAU * across * f64::from(height) / f64::from(width);
+                    let rise = std::f64::consts::PI * above;
+                    let level = libm::cos(rise);
+                    let ahead = forward.map(|c| c * level * libm::cos(turn));
+                    (eye, from(level * libm::sin(turn), libm::sin(rise), ahead))
+                }
+            };
+            all.extend(self.trace(origin, unit(direction), depth, None));
         }
         all
     }
@@ -312,6 +327,34 @@ fn with(material: Material) -> Model {
     let material = model.add_material("tried", material);
     model.spheres.push(Sphere { centre: [0.9, -0.5, 0.9], radius: 0.9, material });
     model
+}
+
+#[test]
+fn projections() {
+    let orthographic = CameraSpec { projection: Projection::Orthographic, height: Some(5.0), ..camera() };
+    check("orthographic", &still_life(), &orthographic, 1.5, 8);
+    // Not level, and not from the middle.
+    let spherical = CameraSpec { projection: Projection::Spherical, eye: [1.5, -1.0, 1.7], ..camera() };
+    check("spherical", &still_life(), &spherical, 1.5, 8);
+}
+
+/// A small bright sphere that is twice as far away as what is in focus: its spot is as wide as the thin lens's circle of
+/// confusion and itself.
+#[test]
+fn a_lens_blurs_as_much() {
+    let mut model = Model::default();
+    let material =
+        model.add_material("bright", Material { emission: [1000.0; 3], diffuse: [0.0; 3], ..Material::MATT });
+    model.spheres.push(Sphere { centre: [0.0, 0.0, -4.0], radius: 0.01, material });
+    let (eye, target, up) = ([0.0; 3], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]);
+    let lens = CameraSpec { aperture: 0.05, focus: Some(2.0), fov_y_degrees: 20.0, eye, target, up, ..camera() };
+    let side = 160;
+    let Some(picture) = povray(&model, &lens, "lens", side, side) else { return };
+    let lit = picture.chunks(3).filter(|pixel| pixel[0] > 10_000).count();
+    let diameter = 2.0 * (lit as f64 / std::f64::consts::PI).sqrt();
+    let pixel = 2.0 * libm::tan(10f64.to_radians()) / f64::from(side);
+    let expected = (2.0 * 0.05 * (4.0 - 2.0) / 4.0 / 2.0 + 2.0 * 0.01 / 4.0) / pixel;
+    assert!((diameter - expected).abs() < 1.0, "{diameter} pixels, and should be {expected}");
 }
 
 #[test]

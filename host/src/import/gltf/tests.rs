@@ -50,7 +50,7 @@ fn scene() -> Value {
         ],
         "cameras": [
             {"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}},
-            {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}},
+            {"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 1.5, "zfar": 9, "znear": 0.1}},
         ],
         "extensions": {"KHR_lights_punctual": {"lights": [
             {"type": "point", "intensity": 100, "color": [1, 0.5, 0]},
@@ -118,7 +118,6 @@ fn nodes_place_and_mirror_what_is_in_them() {
         model.warnings,
         [
             "a.gltf: lines and points are not drawn (2 times, here first)",
-            "a.gltf: the camera `camera 1` is orthographic, and left out",
             "a.gltf: meshes that are used more than once are stored for each use: 2.0 times the triangles",
         ]
     );
@@ -136,6 +135,13 @@ fn materials_cameras_and_lights() {
     assert_eq!((camera.name.as_str(), camera.eye, camera.up), ("eye", [10.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
     assert_eq!(camera.target, [10.0, 0.0, -10.0]);
     assert!((camera.fov_y_degrees - 0.5f32.to_degrees()).abs() < 1e-5);
+    assert_eq!((camera.projection, camera.height), (shading::Projection::Perspective, None));
+    // `ymag` is half of what is seen.
+    let flat = &model.cameras[1];
+    assert_eq!(
+        (flat.name.as_str(), flat.projection, flat.height),
+        ("camera 1", shading::Projection::Orthographic, Some(3.0))
+    );
     let [spot, point, sun] = &model.lights[..] else { panic!("{} lights", model.lights.len()) };
     let pi = std::f32::consts::PI;
     assert_eq!((point.kind(), point.flags, point.colour), (LightKind::Point, 1, [100.0 / pi, 50.0 / pi, 0.0]));

@@ -63,6 +63,12 @@ pub(super) struct CameraTable {
     pub(super) fov: Maybe<f64>,
     pub(super) hither: Maybe<f64>,
     pub(super) size: Maybe<Vec<i64>>,
+    pub(super) projection: Maybe<String>,
+    pub(super) height: Maybe<f64>,
+    pub(super) aperture: Maybe<f64>,
+    pub(super) focus: Maybe<f64>,
+    pub(super) blades: Maybe<i64>,
+    pub(super) blade_rotation: Maybe<f64>,
 }
 
 #[derive(Deserialize)]

@@ -113,6 +113,20 @@ fn includes_move_and_bring_their_own() {
     let m = import(&format!("{own}[[include]]\nfile = 'ball.nff'\n")).expect("reads");
     assert_eq!((m.background, m.cameras.len(), m.lights.len()), ([0.25; 3], 1, 1));
     assert_eq!(m.cameras[0].name, "camera1");
+
+    let lens = "[[camera]]\neye = [0, 0, 3]\ntarget = [0, 4, 0]\naperture = 0.25\nblades = 7\nblade_rotation = -20\n";
+    let flat = "[[camera]]\neye = [0, 0, 3]\ntarget = [0, 4, 0]\nprojection = 'orthographic'\n";
+    let around = "[[camera]]\neye = [0, 0, 3]\ntarget = [0, 4, 0]\nprojection = 'spherical'\n";
+    let text = format!("{lens}{lens}focus = 2\n{flat}{flat}height = 7\n{around}[[include]]\nfile = 'ball.nff'\n");
+    let cameras = import(&text).expect("reads").cameras;
+    let lens = |c: &CameraSpec| (c.aperture, c.focus_distance(), c.blades, c.blade_rotation_degrees);
+    assert_eq!(lens(&cameras[0]), (0.25, 5.0, 7, -20.0), "what it looks at is sharp");
+    assert_eq!(lens(&cameras[1]), (0.25, 2.0, 7, -20.0));
+    let projections = [0, 1, 1, 2].map(|number| Projection::from_u32(number).expect("one of three"));
+    assert!(cameras[1..].iter().zip(projections).all(|(camera, expected)| camera.projection == expected));
+    // As much as is seen at the distance 5 within 40 degrees.
+    assert!((cameras[2].picture_height() - 10.0 * 20f32.to_radians().tan()).abs() < 1e-5);
+    assert_eq!(cameras[3].picture_height(), 7.0);
 }
 
 #[test]
@@ -173,6 +187,20 @@ fn mistakes_name_their_line() {
     check(&format!("{camera}name = 'a'\n{camera}name = 'a'"), "5: two cameras are called `a`");
     check(&format!("{camera}name = ''"), "4: `name` is empty");
     check("[[camera]]\neye = [0, 0]\ntarget = [0, 0, 0]", "2: `eye` has 2 numbers");
+    check(&format!("{camera}projection = 'fisheye'"), "4: `projection` is `fisheye`; give one of \"perspective\", ");
+    check(&format!("{camera}height = 2"), "4: `height` means nothing for a camera that is perspective; leave it out");
+    for key in ["fov = 40", "aperture = 0.1", "focus = 2", "blades = 5", "blade_rotation = 5"] {
+        let (name, _) = key.split_once(' ').expect("a key");
+        let problem = format!("5: `{name}` means nothing for a camera that is");
+        check(&format!("{camera}projection = 'spherical'\n{key}"), &problem);
+        check(&format!("{camera}projection = 'orthographic'\n{key}"), &problem);
+    }
+    check(&format!("{camera}projection = 'orthographic'\nheight = 0"), "5: `height` is 0; give more than 0");
+    check(&format!("{camera}aperture = -1"), "4: `aperture` is -1; give 0 and up");
+    check(&format!("{camera}aperture = 5000"), "1: the camera's aperture is 5000 and its focus 1");
+    check(&format!("{camera}focus = 0"), "4: `focus` is 0; give more than 0");
+    check(&format!("{camera}blades = 2"), "4: an opening of 1 or 2 blades is none; give 3 to 16, or 0");
+    check(&format!("{camera}blades = 17"), "4: `blades` is 17; give 0 to 16");
     check("[[camera]]\neye = [0, 0, 1e31]\ntarget = [0, 0, 0]", "2: `eye` holds 1");
     check("[[light]]", "1: `kind` is missing");
     check("[[light]]\nkind = 'sun'", "2: `kind` is `sun`; give one of");
