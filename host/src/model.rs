@@ -169,8 +169,6 @@ pub struct Model {
     pub textures: Vec<Texture>,
     /// How materials use them.
     pub uses: Vec<Map>,
-    /// Triangles that the file itself has, where it uses a mesh more than once.
-    pub stored_triangles: Option<u64>,
     /// Lights; empty if the file has none (a default is then made).
     pub lights: Vec<Light>,
     /// Cameras; empty if the file has none (the model is then framed).

@@ -9,9 +9,7 @@ use crate::material::Material;
 use crate::vector::basis;
 use glam::Vec3;
 
-/// Widths of the distribution below this count as this for lights at a place, whose highlight would be a point.
-const WIDTH_MIN: f32 = 1.0 / 256.0;
-/// Widths below this mirror without being sampled.
+/// Widths of the distribution below this mirror without being sampled, and show no highlights of lights: those would be points.
 const SMOOTH: f32 = 1.0 / 1024.0;
 
 /// A physical material at a hit.
@@ -37,7 +35,8 @@ impl Glossy {
             diffuse: base.map(|c| c * (1.0 - metal - through)),
             front: base.map(|c| dielectric + c * metal),
             width: material.exponent * material.exponent,
-            through: base.map(|c| c * through),
+            // What goes through a body meets its boundary twice.
+            through: base.map(|c| libm::sqrtf(c) * through),
         }
     }
 
@@ -58,6 +57,7 @@ impl Glossy {
     /// What of a light from `light` (unit) is seen against `incoming`: for irradiance over pi of 1 at normal incidence. `cosine` is
     /// that of the light and the normal, more than 0. `glints` says whether facets mirror it.
     pub fn shown(&self, incoming: Vec3, normal: Vec3, light: Vec3, cosine: f32, glints: bool) -> [f32; 3] {
+        let glints = glints && self.width >= SMOOTH;
         let between = light - incoming;
         let square = between.dot(between);
         let view = -incoming.dot(normal);
@@ -66,12 +66,12 @@ impl Glossy {
         }
         let half = between / libm::sqrtf(square);
         let fresnel = self.fresnel(half.dot(light));
-        let width = if self.width > WIDTH_MIN { self.width } else { WIDTH_MIN };
+        let width = self.width;
         let height = half.dot(normal).clamp(0.0, 1.0);
         // 1 - height^2 by the part across, which keeps its digits near the mirror direction.
         let across = half - normal * height;
         let spread = width * width * height * height + across.dot(across);
-        let facets = width * width / (spread * spread);
+        let facets = if spread > 0.0 { width * width / (spread * spread) } else { 0.0 };
         // Pi times distribution times shadowing over 4 n.l n.v; the cosine of the light is multiplied in.
         let shadowing = 0.5 / (cosine * reach(width, view) + view * reach(width, cosine));
         let glint = if glints { facets * shadowing * cosine } else { 0.0 };

@@ -18,8 +18,8 @@ pub enum Highlight {
 /// A material as a node's table holds it. Colours are linear, 0 and up.
 ///
 /// With [`Material::PHYSICAL`] it is one of metallic-roughness: `diffuse` is the base colour, `exponent` the roughness, `mirror` the
-/// metalness (of which the first number counts), `transmission` the share of what is no metal that goes through, times the base
-/// colour, and `ambient` the absorption inside: light that goes as far as a file unit keeps `exp(-ambient)` of itself. Its
+/// metalness (of which the first number counts), `transmission` the share of what is no metal that goes through, times the root of
+/// the base colour (a body has two sides), and `ambient` the absorption inside: light that goes as far as a file unit keeps `exp(-ambient)` of itself. Its
 /// diffuse part reflects ambient light, and `specular` and `highlight` are not used.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]

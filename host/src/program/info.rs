@@ -43,6 +43,16 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
         if prepared.packed.compact_pages() > 0 { "compact" } else { "full" },
         bytes as f64 / primitives as f64
     )?;
+    if !prepared.packed.textures.is_empty() {
+        let texels: u64 = prepared.packed.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+        writeln!(
+            out,
+            "textures     {} of {texels} texels, in {} pages of {} bytes",
+            prepared.packed.textures.len(),
+            prepared.packed.pages() as u32 - prepared.packed.geometry_pages(),
+            prepared.packed.texel_bytes()
+        )?;
+    }
     writeln!(out, "voxels       {}", prepared.packed.voxels())?;
     writeln!(
         out,

@@ -430,7 +430,18 @@ fn traffic_line(traced: &Traced, fit: &Fit, memory: u64) -> String {
     let rays: u64 = exchanges.iter().map(|node| node.traffic.forwarded).sum();
     let pages: u64 = exchanges.iter().map(|node| node.traffic.fetched).sum();
     let high_water = exchanges.iter().map(|node| node.memory_high_water).max().unwrap_or(0);
-    format!("{rays} rays and {pages} pages went from node to node; none used more than {high_water} bytes of {memory}")
+    let sum = |of: fn(&Exchange) -> u64| exchanges.iter().map(of).sum::<u64>();
+    let (look_ups, bytes) = (sum(|node| node.traffic.look_ups), sum(|node| node.traffic.texel_bytes));
+    let texels = match look_ups {
+        0 => String::new(),
+        _ => format!(
+            "; {look_ups} look-ups in textures, for which {bytes} bytes came: {:.2} bytes each",
+            bytes as f64 / look_ups as f64
+        ),
+    };
+    format!(
+        "{rays} rays and {pages} pages went from node to node; none used more than {high_water} bytes of {memory}{texels}"
+    )
 }
 
 fn nodes_of(traced: &Traced, fit: Option<&Fit>) -> Vec<Node> {

@@ -234,6 +234,10 @@ pub(super) struct Traffic {
     pub refused: u64,
     /// Pages that came here.
     pub fetched: u64,
+    /// Bytes of those that were of texels.
+    pub texel_bytes: u64,
+    /// Bilinear look-ups in textures.
+    pub look_ups: u64,
     /// Pages that were sent to others.
     pub served: u64,
 }
@@ -250,6 +254,8 @@ impl Exchange {
                 forwarded: t.forwarded,
                 refused: t.refused,
                 fetched: t.fetched,
+                texel_bytes: t.texel_bytes,
+                look_ups: worked.walks.look_ups,
                 served: t.served,
             },
             memory_high_water: fixed + h.page_bytes,

@@ -109,6 +109,10 @@ impl<P: Store> Node<'_, '_, P> {
             Landed::Whole => {
                 self.requests.remove(at);
                 self.traffic.fetched += 1;
+                let entry = self.scene.resident.directory.entries[page as usize];
+                if entry.kind == PageEntry::TEXELS {
+                    self.traffic.texel_bytes += u64::from(entry.bytes);
+                }
                 self.memory.pool.landed(page);
             }
             // It will be wanted again, and its home has it.

@@ -121,6 +121,8 @@ pub struct Traffic {
     pub refused: u64,
     /// Pages that came here.
     pub fetched: u64,
+    /// Bytes of those that were of texels.
+    pub texel_bytes: u64,
     /// Pages that were sent to others.
     pub served: u64,
     /// Records that came from peers and made no sense.
@@ -133,6 +135,7 @@ impl core::ops::AddAssign for Traffic {
         self.forwarded += b.forwarded;
         self.refused += b.refused;
         self.fetched += b.fetched;
+        self.texel_bytes += b.texel_bytes;
         self.served += b.served;
         self.nonsense += b.nonsense;
     }
@@ -148,6 +151,7 @@ impl core::ops::Sub for Traffic {
             forwarded: self.forwarded.saturating_sub(b.forwarded),
             refused: self.refused.saturating_sub(b.refused),
             fetched: self.fetched.saturating_sub(b.fetched),
+            texel_bytes: self.texel_bytes.saturating_sub(b.texel_bytes),
             served: self.served.saturating_sub(b.served),
             nonsense: self.nonsense.saturating_sub(b.nonsense),
         }
