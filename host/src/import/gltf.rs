@@ -562,7 +562,7 @@ impl Reader<'_> {
                 light.cos_inner = libm::cosf(inner_cone_angle).max(light.cos_outer);
             }
         }
-        if from.kind() != Kind::Directional && from.intensity() > 1000.0 {
+        if !matches!(from.kind(), Kind::Directional) && from.intensity() > 1000.0 {
             self.warn(
                 "lights of thousands of candela: if all is white, give --exposure 0.0015 (one watt for 683 lumens)",
             );

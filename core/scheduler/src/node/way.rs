@@ -46,11 +46,13 @@ impl Way<'_> {
     }
 
     /// Where a ray that hits nothing ends: a page of the last node on its way that owns any, so that it comes there.
-    /// `None` if that is at hand. Owners are looked up as they are where voxels are nodes: in order.
+    /// `None` if that is at hand. Owners are looked up as they are where voxels are nodes: in order, but for texels.
     pub fn last<P: Pages + ?Sized>(&self, ray: &RayRecord, scene: &Scene<'_, P>) -> Option<u32> {
+        let geometry = self.entries.partition_point(|entry| entry.kind == PageEntry::GEOMETRY);
+        let entries = &self.entries[..geometry];
         let first = |node: Peer| {
-            let at = self.entries.partition_point(|entry| entry.owner < node);
-            self.entries.get(at).filter(|entry| entry.owner == node).map(|_| at as u32)
+            let at = entries.partition_point(|entry| entry.owner < node);
+            entries.get(at).filter(|entry| entry.owner == node).map(|_| at as u32)
         };
         let last = self.nodes(ray).filter_map(first).last();
         last.filter(|&page| scene.resident.pages.nearest(page).is_none())
