@@ -280,9 +280,12 @@ impl Plan {
         sum.add::<u32>("where pages are", s.pages);
         sum.add::<Material>("materials", s.materials);
         sum.add::<Light>("lights", s.lights);
-        sum.add::<Maps>("what materials take from textures", s.maps[0]);
-        sum.add::<Map>("uses of textures", s.maps[1]);
-        sum.add::<Texture>("textures", s.maps[2]);
+        // A scene without textures does not speak of them.
+        if s.maps != [0; 3] {
+            sum.add::<Maps>("what materials take from textures", s.maps[0]);
+            sum.add::<Map>("uses of textures", s.maps[1]);
+            sum.add::<Texture>("textures", s.maps[2]);
+        }
         sum.add::<CachePlace>("places of the cache", self.places);
         sum.add::<Line>("pages", self.lines - self.copied_lines);
         sum.add::<Line>("copies of pages", self.copied_lines);

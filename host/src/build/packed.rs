@@ -297,8 +297,8 @@ impl<'a> Pages<'a> {
                         [bytemuck::cast_slice(&about), bytemuck::cast_slice(shape), bytemuck::cast_slice(normals)];
                     // What stands in a page only because others of it have it counts as what it means: nothing.
                     let more = [
-                        coordinates.filter(|c| **c != Coordinates::default()).map(|c| bytemuck::bytes_of(c)),
-                        colours.filter(|c| **c != [[u8::MAX; 4]; 3]).map(|c| bytemuck::bytes_of(c)),
+                        coordinates.filter(|c| **c != Coordinates::default()).map(bytemuck::bytes_of),
+                        colours.filter(|c| **c != [[u8::MAX; 4]; 3]).map(bytemuck::bytes_of),
                     ];
                     // A sum: it is the same in any order.
                     let hash = parts.into_iter().chain(more.into_iter().flatten()).fold(HASH_START, hash_bytes);

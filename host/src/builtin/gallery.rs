@@ -121,7 +121,7 @@ pub fn gallery(side: u32) -> Model {
         if joint(u, v) {
             return [60, 55, 50, 255];
         }
-        let dark = (u as u32 + v as u32) % 2 == 0;
+        let dark = (u as u32 + v as u32).is_multiple_of(2);
         let grain = 0.5 + 0.5 * noise::value(6.0 * u, 40.0 * v, 3);
         let shade = if dark { 0.25 + 0.2 * grain } else { 0.6 + 0.25 * grain };
         [step(shade), step(0.8 * shade), step(0.6 * shade), 255]

@@ -452,7 +452,7 @@ impl Reader<'_> {
         self.check(&accessor, &types, dimensions, what)?;
         let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
         let encoded = |[r, g, b, a]: [f32; 4]| {
-            let [r, g, b] = [r, g, b].map(|c| encode_srgb8(c));
+            let [r, g, b] = [r, g, b].map(encode_srgb8);
             [r, g, b, (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
         };
         let colours = reader.read_colors(0).map(|c| c.into_rgba_f32().map(encoded).collect::<Vec<_>>());

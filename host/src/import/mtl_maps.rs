@@ -4,8 +4,9 @@
 //! `-imfchan`; other options are read over. Coverage comes into the fourth channel of the colours' picture, roughness and
 //! metalness into one of their own; a height becomes the slopes to the next texels. Two pictures in one are as large as the larger.
 
-use super::error::{Warnings, quote};
+use super::error::{ImportError, Warnings, quote};
 use super::gltf::picture_file;
+use super::{Opened, mtl, open};
 use crate::picture::encode_srgb8;
 use crate::texture::{Image, Texture};
 use hybray_shading::{Format, Map, Maps, Material, Sampling, Wrap, from_shared_exponent};
@@ -199,6 +200,60 @@ pub(crate) fn read(folder: &Path, named: &[Named], material: &mut Material, warn
         material.flags |= Material::DETAIL;
     }
     pictures
+}
+
+/// What a `mtllib` line brought.
+pub(super) type Library = Result<(Vec<(String, Known)>, Vec<String>), MaterialFile>;
+
+/// A material of a material file: it may have pictures.
+#[derive(Clone)]
+pub(super) struct Known {
+    pub material: Material,
+    pub maps: Maps,
+    pub pictures: Arc<Pictures>,
+}
+
+impl Known {
+    /// Without pictures.
+    pub fn plain(material: Material) -> Self {
+        Self { material, maps: Maps::EMPTY, pictures: Arc::default() }
+    }
+
+    /// Reads what stands in `folder`.
+    pub fn all(folder: &Path, described: Vec<mtl::Described>, warnings: &mut Warnings) -> Vec<(String, Self)> {
+        let known = described.into_iter().map(|(name, (mut material, maps), named)| {
+            let pictures = Arc::new(read(folder, &named, &mut material, warnings));
+            (name, Self { material, maps, pictures })
+        });
+        known.collect()
+    }
+}
+
+/// Why it brought nothing.
+pub(super) enum MaterialFile {
+    Missing,
+    Broken(ImportError),
+}
+
+pub(super) fn read_materials(folder: &Path, name: &str) -> Library {
+    // Names are often written by a program for another system.
+    let candidates = [name.to_owned(), name.replace('\\', "/")];
+    for candidate in candidates {
+        let path = folder.join(candidate);
+        let file = path.display().to_string();
+        match open(&path) {
+            Ok(reader) => {
+                let mut warnings = Warnings::default();
+                let materials = mtl::read(reader, &file, &mut warnings).map_err(MaterialFile::Broken)?;
+                let materials = Known::all(path.parent().unwrap_or(Path::new("")), materials, &mut warnings);
+                return Ok((materials, warnings.lines(&file).collect()));
+            }
+            Err(Opened::Missing(_)) => {}
+            Err(Opened::Empty) => return Ok((Vec::new(), vec![format!("{file}: the material file is empty")])),
+            Err(other) => return Err(MaterialFile::Broken(other.into_error(&file))),
+        }
+    }
+    Err(MaterialFile::Missing)
 }
 
 /// The mean of red, green and blue, encoded as they are.

@@ -20,15 +20,14 @@
 use super::error::{ImportError, Warnings, quote};
 use super::lines::{Lines, without_comment};
 use super::meshes::Meshes;
-use super::mtl_maps::{self, Pictures};
+use super::mtl_maps::{Known, Library, MaterialFile, read_materials};
 use super::polygon::{CORNERS_MAX, Polygons, has_area, unit};
-use super::{COORDINATE_MAX, Opened, guarded, mtl, open};
+use super::{COORDINATE_MAX, guarded, mtl, open};
 use crate::model::{Mesh, Model, NamedMaterial};
-use hybray_shading::{Map, Maps, Material};
+use hybray_shading::Map;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, Read, Write as _};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Faces after which `tobj` is told of a new object: 27 MB of its records, and few enough borders between pieces that
 /// the vertices they share, kept twice, do not count (about 1 in 250 in a mesh that is stored in strips).
@@ -49,60 +48,6 @@ pub(crate) fn load(path: &Path) -> Result<Model, ImportError> {
     let reader = open(path).map_err(|e| e.into_error(&file))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     read(reader, &file, |name| read_materials(folder, name))
-}
-
-/// What a `mtllib` line brought.
-pub(super) type Library = Result<(Vec<(String, Known)>, Vec<String>), MaterialFile>;
-
-/// A material of a material file: it may have pictures.
-#[derive(Clone)]
-pub(super) struct Known {
-    material: Material,
-    maps: Maps,
-    pictures: Arc<Pictures>,
-}
-
-impl Known {
-    /// Without pictures.
-    fn plain(material: Material) -> Self {
-        Self { material, maps: Maps::EMPTY, pictures: Arc::default() }
-    }
-
-    /// Reads what stands in `folder`.
-    pub(super) fn all(folder: &Path, described: Vec<mtl::Described>, warnings: &mut Warnings) -> Vec<(String, Self)> {
-        let known = described.into_iter().map(|(name, (mut material, maps), named)| {
-            let pictures = Arc::new(mtl_maps::read(folder, &named, &mut material, warnings));
-            (name, Self { material, maps, pictures })
-        });
-        known.collect()
-    }
-}
-
-/// Why it brought nothing.
-pub(super) enum MaterialFile {
-    Missing,
-    Broken(ImportError),
-}
-
-fn read_materials(folder: &Path, name: &str) -> Library {
-    // Names are often written by a program for another system.
-    let candidates = [name.to_owned(), name.replace('\\', "/")];
-    for candidate in candidates {
-        let path = folder.join(candidate);
-        let file = path.display().to_string();
-        match open(&path) {
-            Ok(reader) => {
-                let mut warnings = Warnings::default();
-                let materials = mtl::read(reader, &file, &mut warnings).map_err(MaterialFile::Broken)?;
-                let materials = Known::all(path.parent().unwrap_or(Path::new("")), materials, &mut warnings);
-                return Ok((materials, warnings.lines(&file).collect()));
-            }
-            Err(Opened::Missing(_)) => {}
-            Err(Opened::Empty) => return Ok((Vec::new(), vec![format!("{file}: the material file is empty")])),
-            Err(other) => return Err(MaterialFile::Broken(other.into_error(&file))),
-        }
-    }
-    Err(MaterialFile::Missing)
 }
 
 /// The same from any reader; `library` finds what a `mtllib` line names.

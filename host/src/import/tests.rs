@@ -174,12 +174,12 @@ fn broken_bytes_break_nothing() {
         let start = Instant::now();
         let library = |_: &str| {
             let mut warnings = error::Warnings::default();
-            let found = mtl::read(&bytes[..], name, &mut warnings).map_err(obj::MaterialFile::Broken)?;
-            let found = obj::Known::all(Path::new(""), found, &mut warnings);
+            let found = mtl::read(&bytes[..], name, &mut warnings).map_err(mtl_maps::MaterialFile::Broken)?;
+            let found = mtl_maps::Known::all(Path::new(""), found, &mut warnings);
             Ok((found, Vec::new()))
         };
         let result = match name {
-            "a.obj" => obj::read(&bytes[..], name, |_| Err(obj::MaterialFile::Missing)),
+            "a.obj" => obj::read(&bytes[..], name, |_| Err(mtl_maps::MaterialFile::Missing)),
             "m.mtl" => obj::read(OBJ.as_bytes(), "a.obj", library),
             "a.nff" => nff::read(&bytes[..], name),
             _ => scene_toml::read(&String::from_utf8_lossy(&bytes), name, folder.path()),

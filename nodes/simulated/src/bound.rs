@@ -97,9 +97,14 @@ impl Bound {
         let pages = pages + u128::from(settings.grid.is_some() && pages > 0);
         let steps = (pages + 1) * walks.chain + 1;
         // Pages that are asked for have places, and a peer is asked for so many at a time; the lane's goes before the others.
-        let open = usize::from(settings.requests).clamp(1, REQUESTS_MAX).min(plan.places.saturating_sub(1)).max(1);
+        let common = plan.places.saturating_sub(plan.sizes.lane_places());
+        let open = usize::from(settings.requests).clamp(1, REQUESTS_MAX).min(common).max(1);
         let asks = (open + 1).div_ceil(FETCHES) as u128;
-        let wait_ns = (asks + 2) * quiet_round_ns;
+        // A hit waits for each page of texels, in vain up to so many times, and then once more in the lane: nothing is traced
+        // meanwhile.
+        let texels = plan.sizes.texel_pages_of_a_hit as u128;
+        let waits = if texels == 0 { 1 } else { 3 * texels + 5 };
+        let wait_ns = (asks + 2) * quiet_round_ns * waits;
         // A page behind all others that may be wanted, and rays at the end of a full outbox. Each twice a step, and two ways
         // until there is room for a sum.
         let wanted = limits.pages.min(limits.rays);
@@ -110,7 +115,7 @@ impl Bound {
         let in_pool = steps * hops * (2 * turn + 2 * sent as u128 + 1) + rays.div_ceil(sums);
         // The lane stands still: a round until its page can be asked for, and one until it comes.
         let in_lane = (u128::from(frame.depth_max) + 1) * steps * 2;
-        let rounds = if pages == 0 { 1 } else { in_pool + in_lane };
+        let rounds = if pages == 0 { 1 } else { (in_pool + in_lane) * waits };
         let tracing_ns = (rays * walks.life_ps(pages) + tiles_ps) / 1000 + steps;
         Self {
             walk_ns: walks.walk_ps / 1000 + 1,
