@@ -76,6 +76,7 @@ fn what_comes_out_is_what_went_in() {
     check("spd:balls:2@blades", Rule::SurfaceArea, Voxels::One, PageForm::Full);
     check("spd:balls:2@orthographic", Rule::SurfaceArea, Voxels::One, PageForm::Full);
     check("terrain:3000", Rule::SurfaceArea, Voxels::Adaptive(4), PageForm::Compact);
+    check("gallery:40", Rule::SurfaceArea, Voxels::Grid([2, 1, 2]), PageForm::Full);
 }
 
 /// Opens a file of these bytes: refused with a line that names it, or else it must be the scene that was written.
