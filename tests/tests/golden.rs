@@ -31,7 +31,7 @@ const GOLDEN: [(&str, u64); 15] = [
     ("cornell:mirror", 0x2dc36ae38a0590e5),
     ("organic:3000", 0xa8734b777f7e6cce),
     ("terrain:8000", 0x0f44243739ae19fd),
-    ("gallery:64", 0x2098c058c5bed508),
+    ("gallery:64", 0x431652555ff81377),
 ];
 
 #[test]

@@ -287,6 +287,8 @@ mod tests {
             "paper:balls" => 7_381,
             "paper:balls5" => 66_430,
             "paper:conference" => 23_966,
+            // Its size is that of its pictures: six rectangles, a block, and balls of 48 by 24 quads but for the poles.
+            "gallery" => 6 * 2 + 12 + 2 * (2 * 48 * 24 - 2 * 48),
             other => panic!("{other}"),
         }
     }

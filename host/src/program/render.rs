@@ -47,10 +47,13 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
     let named = |camera: &CameraSpec| View::named(&path, format, camera.clone());
     let views: Option<Vec<View>> = cameras.map(|cameras| cameras.iter().map(named).collect());
     // What could go wrong at the end is tried at the beginning.
-    match &views {
-        Some(views) => views.iter().try_for_each(|view| Output::create(&view.path, format).map(drop))?,
-        None => drop(Output::create(&path, format)?),
-    }
+    let output = match &views {
+        Some(views) => {
+            views.iter().try_for_each(|view| Output::create(&view.path, format).map(drop))?;
+            None
+        }
+        None => Some(Output::create(&path, format)?),
+    };
     let json = args.json.as_deref().map(ReportFile::create).transpose()?;
     if path == Path::new("-") && args.json.as_deref() == Some(Path::new("-")) {
         bail!("the picture and the report cannot both go to standard output: give one of them a file");
@@ -159,6 +162,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<End> {
         show: &mut show,
         interrupted: &interrupted,
         views: &views,
+        output,
         jobs: &jobs,
         scene: &scene_hash,
         every: Duration::from_secs(args.save_every.into()),

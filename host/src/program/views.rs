@@ -76,6 +76,8 @@ pub(super) struct Views<'a> {
     pub show: &'a mut Show,
     pub interrupted: &'a AtomicBool,
     pub views: &'a [View],
+    /// Where the picture goes, if it is one and its place is open.
+    pub output: Option<Output>,
     pub jobs: &'a [Job],
     /// Hash of the scene, asked for when it is first needed.
     pub scene: &'a dyn Fn() -> u64,
@@ -158,7 +160,7 @@ impl<'a> Views<'a> {
     fn write(&mut self, view: &View) {
         let next = self.drawing.next();
         let drawing = std::mem::replace(&mut self.drawing, next);
-        let output = Output::create(&view.path, view.format);
+        let output = self.output.take().map_or_else(|| Output::create(&view.path, view.format), Ok);
         let written = output.and_then(|output| output.write_with(&drawing.picture, self.exposure, &drawing.channels()));
         match written {
             Ok(()) if self.views.len() > 1 => self.show.line(&format!("{}", view.path.display())),
