@@ -1,4 +1,4 @@
-# Makes the three scenes of docs/FORMATS.md as .glb files, and renders them with Cycles: `pip install bpy`, then `python blender.py FOLDER`.
+# Makes the four scenes of docs/FORMATS.md as .glb files, and renders them with Cycles: `pip install bpy`, then `python blender.py FOLDER`.
 import bpy, math, sys, os
 import numpy as np
 out = sys.argv[-1]
@@ -115,3 +115,24 @@ for i,v in enumerate(o.data.vertices):
 ca=m.node_tree.nodes.new('ShaderNodeVertexColor'); ca.layer_name='Col'; m.node_tree.links.new(ca.outputs[0],p.inputs['Base Color'])
 light('POINT',(2.5,-3.5,4.5),700); light('POINT',(-3,-2,3),250,color=(.7,.8,1))
 camera(s,(0,-6.5,2.6),(0,0,.8)); done(s,'glass')
+
+# 4: surroundings: a sky with a sun, above a chequered ground (`hybray render sky.glb --environment sky.hdr`)
+s=clear()
+def around(u,v):
+    t=np.pi*(1-v); p=2*np.pi*(u-.5)
+    d=np.stack([np.cos(p)*np.sin(t),-np.sin(p)*np.sin(t),np.cos(t)],-1)  # Blender's axes: the middle is +X, the right -Y
+    sun=np.array([.35,-.6,.55]); sun/=np.linalg.norm(sun); c=d@sun
+    z=d[...,2:3]; ground=np.minimum(z,-1e-2)
+    checks=np.sign(np.sin(9*d[...,0:1]/ground)*np.sin(9*d[...,1:2]/ground))*(z<-.1)
+    px=np.where(z>0,np.array([.25,.45,.9])*(.6+.5*(1-np.clip(z,0,1)))+np.exp(-(1-c)/.02)[...,None]*np.array([1.5,1.3,.9]),np.array([.18,.15,.11])*(1+.5*checks))
+    px=px+np.where(c>np.cos(np.radians(1)),1,0)[...,None]*np.array([2000.,1900.,1700.])
+    return np.concatenate([px,np.ones_like(px[...,:1])],-1)
+y,x=np.mgrid[0:512,0:1024]
+im=bpy.data.images.new('sky',1024,512,alpha=False,float_buffer=True,is_data=True); im.pixels.foreach_set(around((x+.5)/1024,(y+.5)/512).astype(np.float32).ravel())
+im.filepath_raw=os.path.join(out,'sky.hdr'); im.file_format='HDR'; im.save(); im=bpy.data.images.load(os.path.join(out,'sky.hdr'))
+nt=s.world.node_tree; e=nt.nodes.new('ShaderNodeTexEnvironment'); e.image=im; nt.links.new(e.outputs[0],nt.nodes['Background'].inputs[0])
+m,p=mat('floor',(.6,.6,.6),rough=.9); plane(7,m)
+m,p=mat('chrome',(.95,.95,.95),1,.0); bpy.ops.mesh.primitive_uv_sphere_add(segments=128,ring_count=64,radius=.7,location=(-1.6,0,.7)); o=bpy.context.object; smooth(o); put(o,m)
+m,p=mat('matt',(.8,.75,.7),0,1); bpy.ops.mesh.primitive_monkey_add(size=1.6,location=(0,-.4,.8),rotation=(-.5,0,.2)); o=bpy.context.object; o.modifiers.new('s','SUBSURF').levels=2; o.modifiers['s'].render_levels=2; smooth(o); put(o,m)
+m,p=mat('brushed',(.9,.6,.4),1,.4); bpy.ops.mesh.primitive_uv_sphere_add(segments=128,ring_count=64,radius=.7,location=(1.6,0,.7)); o=bpy.context.object; smooth(o); put(o,m)
+camera(s,(0,-6.5,2.2),(0,0,.7)); done(s,'sky')

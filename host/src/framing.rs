@@ -42,6 +42,7 @@ pub fn complete_with_up(model: &mut Model, up: [f32; 3]) {
         }
     }
     if model.lights.is_empty()
+        && model.cells.is_empty()
         && let Some([right, above, back]) = model.cameras.first().and_then(basis)
     {
         let light = |from: [f64; 3], strength: f32| {

@@ -4,7 +4,7 @@
 //! turn, then spheres, then cones.
 
 use crate::texture::Texture;
-use hybray_shading::{Light, Map, Maps, Material, Projection};
+use hybray_shading::{Cell, Cut, Environment, Light, LightKind, Map, Maps, Material, Projection, Sky};
 
 /// Triangles that share a material and whether they have vertex normals.
 #[derive(Clone, Debug, Default)]
@@ -177,6 +177,12 @@ pub struct Model {
     pub background: [f32; 3],
     /// Ambient light, multiplied by each material's `ambient`.
     pub ambient: [f32; 3],
+    /// What is all around, if anything.
+    pub sky: Sky,
+    /// What of it lights; empty if nothing does.
+    pub cells: Vec<Cell>,
+    /// Between them.
+    pub cuts: Vec<Cut>,
     /// Settings that the file gives.
     pub settings: Settings,
     /// What the file counts.
@@ -190,6 +196,20 @@ impl Model {
     #[must_use]
     pub fn primitives(&self) -> usize {
         self.meshes.iter().map(|m| m.triangles.len()).sum::<usize>() + self.spheres.len() + self.cones.len()
+    }
+
+    /// What is all around.
+    #[must_use]
+    pub fn environment(&self) -> Environment<'_> {
+        Environment { sky: self.sky, cells: &self.cells, cuts: &self.cuts }
+    }
+
+    /// All lights: those of the table, and what is all around.
+    #[must_use]
+    pub fn all_lights(&self) -> Vec<Light> {
+        let Sky { samples, colour, .. } = self.sky;
+        let around = Light { kind: LightKind::Environment as u32, samples, colour, ..Light::default() };
+        self.lights.iter().copied().chain((samples > 0).then_some(around)).collect()
     }
 
     /// What each material takes from textures; empty if none takes anything.

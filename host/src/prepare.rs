@@ -6,7 +6,9 @@ use crate::framing;
 use crate::model::{CameraSpec, Model, Objects, Settings};
 use crate::pack::{self, HybError, Packing};
 use hybray_scheduler::Step;
-use hybray_shading::{Filter, Light, LightKind, Map, MapTables, Maps, Material, Projection, spawn};
+use hybray_shading::{
+    Cell, Cut, Environment, Filter, Light, LightKind, Map, MapTables, Maps, Material, Projection, Sky, spawn,
+};
 use hybray_tracer::{Layer, Scene};
 use hybray_wire::{Frame, Optics};
 use std::path::Path;
@@ -29,6 +31,9 @@ pub struct Prepared {
     lights: Vec<Light>,
     maps: Vec<Maps>,
     uses: Vec<Map>,
+    sky: Sky,
+    cells: Vec<Cell>,
+    cuts: Vec<Cut>,
     ambient: [f32; 3],
     background: [f32; 3],
     /// Cameras, in file units.
@@ -81,14 +86,14 @@ impl Prepared {
         let scale = libm::ldexpf(1.0, packed.scale_log2);
         let scaled = |v: [f32; 3]| v.map(|x| x * scale);
         let lights: Vec<Light> = model
-            .lights
-            .iter()
+            .all_lights()
+            .into_iter()
             .map(|light| Light {
                 position: scaled(light.position),
                 radius: light.radius * scale,
                 u: scaled(light.u),
                 v: scaled(light.v),
-                ..*light
+                ..light
             })
             .collect();
         let materials: Vec<Material> = model.materials.iter().map(|m| m.material).collect();
@@ -100,6 +105,9 @@ impl Prepared {
             lights,
             maps,
             uses: model.uses,
+            sky: model.sky,
+            cells: model.cells,
+            cuts: model.cuts,
             ambient: model.ambient,
             background: model.background,
             cameras: model.cameras,
@@ -127,7 +135,11 @@ impl Prepared {
         ];
         // What a scene does not have changes nothing.
         let count = if self.maps.is_empty() && self.uses.is_empty() { 3 } else { 5 };
-        tables.into_iter().take(count).fold(hash, build::hash_bytes)
+        let hash = tables.into_iter().take(count).fold(hash, build::hash_bytes);
+        if self.sky == Sky::EMPTY {
+            return hash;
+        }
+        [bytemuck::bytes_of(&self.sky), bytemuck::cast_slice(&self.cells)].into_iter().fold(hash, build::hash_bytes)
     }
 
     /// What a film of `frame` is of: the same for all trees, page sizes and voxels, as the picture is.
@@ -155,6 +167,7 @@ impl Prepared {
             (self.materials.iter().any(|m| m.flags & Material::PHYSICAL != 0), "sampled reflection"),
             (self.materials.iter().any(|m| m.flags & Material::CUTOUT != 0), "cut-outs"),
             (!self.packed.textures.is_empty(), "textures"),
+            (!self.cells.is_empty(), "light from all around"),
         ]
         .into_iter()
         .filter_map(|(required, what)| required.then_some(what))
@@ -167,11 +180,18 @@ impl Prepared {
         [self.lights.len(), self.materials.len()]
     }
 
+    /// What is all around.
+    #[must_use]
+    pub fn environment(&self) -> Environment<'_> {
+        Environment { sky: self.sky, cells: &self.cells, cuts: &self.cuts }
+    }
+
     /// Bytes of the tables that every node has.
     #[must_use]
     pub fn table_bytes(&self) -> u64 {
         let maps = size_of_val(&self.maps[..]) + size_of_val(&self.uses[..]) + size_of_val(&self.packed.textures[..]);
-        (size_of_val(&self.materials[..]) + size_of_val(&self.lights[..]) + maps) as u64
+        let tables = size_of_val(&self.materials[..]) + size_of_val(&self.lights[..]);
+        (tables + maps + size_of_val(&self.cells[..]) + size_of_val(&self.cuts[..])) as u64
     }
 
     /// What nodes need, over opened `pages`.
@@ -187,7 +207,12 @@ impl Prepared {
                 weight_cutoff: CUTOFF,
                 distance_scale: libm::ldexpf(1.0, -self.packed.scale_log2),
                 shadow_rays: spawn::shadow_rays(&self.lights),
-                maps: MapTables { maps: &self.maps, uses: &self.uses, textures: &self.packed.textures },
+                maps: MapTables {
+                    maps: &self.maps,
+                    uses: &self.uses,
+                    textures: &self.packed.textures,
+                    environment: self.environment(),
+                },
             },
             background: self.background,
             magnitude: self.packed.magnitude,

@@ -181,6 +181,7 @@ fn a_refusal_says_what_would_do() {
         let directory_nodes = 1 + pages / 4;
         let (materials, lights) = (random.below(100), random.below(40));
         let (maps, texel_pages_of_a_hit) = ([random.below(30); 3], 2 * random.below(5));
+        let cells = [random.below(2000), random.below(4000)];
         let sizes = Sizes {
             pages,
             pages_bytes,
@@ -189,6 +190,7 @@ fn a_refusal_says_what_would_do() {
             materials,
             lights,
             maps,
+            cells,
             texel_pages_of_a_hit,
         };
         let (nodes, policy) = (1 + random.below(1 << nodes_log2) as u16, Policy::ALL[random.below(4)].1);

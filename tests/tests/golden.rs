@@ -31,7 +31,7 @@ const GOLDEN: [(&str, u64); 15] = [
     ("cornell:mirror", 0x2dc36ae38a0590e5),
     ("organic:3000", 0xa8734b777f7e6cce),
     ("terrain:8000", 0x0f44243739ae19fd),
-    ("gallery:64", 0x431652555ff81377),
+    ("gallery:64", 0xc0bf571fc1e4e145),
 ];
 
 #[test]

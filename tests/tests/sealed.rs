@@ -130,7 +130,7 @@ fn ray(random: &mut Random, nodes: u16) -> RayRecord {
         ray.home = 1 + random.below(usize::from(nodes) + 1) as u16;
     }
     if set(12) {
-        (ray.medium, ray.passed) = (random.below(3) as u16, random.below(3) as u16);
+        (ray.medium, ray.passed, ray.around) = (random.below(3) as u16, random.below(3) as u8, random.below(256) as u8);
     }
     ray
 }

@@ -8,7 +8,7 @@ use crate::policy::Policy;
 use hybray_arena::{Arena, Short, Sum};
 use hybray_bintree::walk::Resident;
 use hybray_scene::{Directory, Line, Node as TreeNode, PageEntry, PageView, Tables, lines_for, parents};
-use hybray_shading::{Light, Map, MapTables, Maps, Material, Texture};
+use hybray_shading::{Cell, Cut, Environment, Light, Map, MapTables, Maps, Material, Texture};
 use hybray_tracer::Scene;
 
 /// What of a scene takes memory.
@@ -28,6 +28,8 @@ pub struct Sizes {
     pub lights: usize,
     /// What materials take from textures, uses of textures, and textures: all 0 for a scene without.
     pub maps: [usize; 3],
+    /// Cells of what is around, and cuts between them.
+    pub cells: [usize; 2],
     /// Texel pages that one hit needs at most.
     pub texel_pages_of_a_hit: usize,
 }
@@ -46,6 +48,7 @@ impl Sizes {
             materials: scene.shading.materials.len(),
             lights: scene.shading.lights.len(),
             maps: [scene.shading.maps.maps.len(), scene.shading.maps.uses.len(), scene.shading.maps.textures.len()],
+            cells: [scene.shading.maps.environment.cells.len(), scene.shading.maps.environment.cuts.len()],
             texel_pages_of_a_hit: scene.shading.maps.pages_of_a_hit(),
         }
     }
@@ -286,6 +289,10 @@ impl Plan {
             sum.add::<Map>("uses of textures", s.maps[1]);
             sum.add::<Texture>("textures", s.maps[2]);
         }
+        if s.cells != [0; 2] {
+            sum.add::<Cell>("cells of the environment", s.cells[0]);
+            sum.add::<Cut>("cuts between cells", s.cells[1]);
+        }
         sum.add::<CachePlace>("places of the cache", self.places);
         sum.add::<Line>("pages", self.lines - self.copied_lines);
         sum.add::<Line>("copies of pages", self.copied_lines);
@@ -315,6 +322,14 @@ impl Plan {
             maps: &*arena.take_with("what materials take from textures", from.maps.len(), |i| from.maps[i])?,
             uses: &*arena.take_with("uses of textures", from.uses.len(), |i| from.uses[i])?,
             textures: &*arena.take_with("textures", from.textures.len(), |i| from.textures[i])?,
+            environment: {
+                let Environment { sky, cells, cuts } = from.environment;
+                Environment {
+                    sky,
+                    cells: &*arena.take_with("cells of the environment", cells.len(), |i| cells[i])?,
+                    cuts: &*arena.take_with("cuts between cells", cuts.len(), |i| cuts[i])?,
+                }
+            },
         };
         let places = arena.take_with("places of the cache", self.places, |_| CachePlace::free())?;
         let lines = arena.take("pages", self.lines, Line([0; 64]))?;

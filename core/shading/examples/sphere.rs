@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                             let left = lit(&scene, origin, direction, t_max, contribution);
                             sum += left.map_or(Vec3::ZERO, Vec3::from);
                         }
-                        Child::Mirror { origin, direction, weight, medium, branch }
+                        Child::Mirror { origin, direction, weight, medium, branch, .. }
                         | Child::Refract { origin, direction, weight, medium, branch } => {
                             waiting.push((origin, direction, weight, depth + 1, medium, id::child_id(id, branch)));
                         }

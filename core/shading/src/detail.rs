@@ -1,5 +1,6 @@
 //! What textures and colours make of a material at a hit.
 
+use crate::environment::Environment;
 use crate::material::Material;
 use crate::spawn::Scene;
 use crate::surface::Surface;
@@ -17,7 +18,7 @@ pub struct Map {
     pub texture: u32,
     /// From the hit's texture coordinates to the texture's: `u' = t[0] u + t[1] v + t[2]`, `v' = t[3] u + t[4] v + t[5]`.
     pub transform: [f32; 6],
-    /// Of a normal map, times its slopes; of a [bump map](Maps::BUMP), the height of white over black, file units.
+    /// Of a normal map, times its slopes; with [`Material::BUMP`], the height of white over black, file units.
     pub strength: f32,
 }
 
@@ -226,6 +227,8 @@ pub struct MapTables<'a> {
     pub uses: &'a [Map],
     /// Textures.
     pub textures: &'a [crate::Texture],
+    /// What is around the scene.
+    pub environment: Environment<'a>,
 }
 
 impl<'a> MapTables<'a> {
@@ -253,10 +256,11 @@ impl<'a> MapTables<'a> {
         texture.look_up(pages, [a * u + b * v + c, d * u + e * v + f], detail.footprint * scale, count)
     }
 
-    /// Texel pages that one hit needs at most.
+    /// Texel pages that one hit, or one ray that hits nothing, needs at most.
     #[must_use]
     pub fn pages_of_a_hit(&self) -> usize {
-        2 * self.maps.iter().map(Maps::count).max().unwrap_or(0)
+        let of_a_material = self.maps.iter().map(Maps::count).max().unwrap_or(0);
+        2 * of_a_material.max(usize::from(self.environment.is_there()))
     }
 
     /// Whether each says only what can be, with so many pages.
@@ -268,5 +272,6 @@ impl<'a> MapTables<'a> {
             && self.maps.iter().all(|m| (0.0..=1.0).contains(&m.coverage) && m.cutoff.is_finite())
             && self.uses.iter().all(|map| (map.texture as usize) < self.textures.len() && finite(map))
             && self.textures.iter().all(|texture| texture.is_sound(pages))
+            && self.environment.is_sound(self.textures.len())
     }
 }

@@ -55,9 +55,9 @@ impl Glossy {
     }
 
     /// What of a light from `light` (unit) is seen against `incoming`: for irradiance over pi of 1 at normal incidence. `cosine` is
-    /// that of the light and the normal, more than 0. `glints` says whether facets mirror it.
-    pub fn shown(&self, incoming: Vec3, normal: Vec3, light: Vec3, cosine: f32, glints: bool) -> [f32; 3] {
-        let glints = glints && self.width >= SMOOTH;
+    /// that of the light and the normal, more than 0. `glints` says how much of it facets mirror.
+    pub fn shown(&self, incoming: Vec3, normal: Vec3, light: Vec3, cosine: f32, glints: f32) -> [f32; 3] {
+        let glints = if self.width >= SMOOTH { glints } else { 0.0 };
         let between = light - incoming;
         let square = between.dot(between);
         let view = -incoming.dot(normal);
@@ -66,17 +66,37 @@ impl Glossy {
         }
         let half = between / libm::sqrtf(square);
         let fresnel = self.fresnel(half.dot(light));
+        let (width, facets) = (self.width, self.facets(half, normal));
+        // Pi times distribution times shadowing over 4 n.l n.v; the cosine of the light is multiplied in.
+        let shadowing = 0.5 / (cosine * reach(width, view) + view * reach(width, cosine));
+        let glint = if glints > 0.0 { facets * shadowing * cosine * glints } else { 0.0 };
+        let below = self.below(view);
+        core::array::from_fn(|c| self.diffuse[c] * below[c] * cosine + fresnel[c] * glint)
+    }
+
+    /// Pi times the distribution of facets whose normal is `half`.
+    fn facets(&self, half: Vec3, normal: Vec3) -> f32 {
         let width = self.width;
         let height = half.dot(normal).clamp(0.0, 1.0);
         // 1 - height^2 by the part across, which keeps its digits near the mirror direction.
         let across = half - normal * height;
         let spread = width * width * height * height + across.dot(across);
-        let facets = if spread > 0.0 { width * width / (spread * spread) } else { 0.0 };
-        // Pi times distribution times shadowing over 4 n.l n.v; the cosine of the light is multiplied in.
-        let shadowing = 0.5 / (cosine * reach(width, view) + view * reach(width, cosine));
-        let glint = if glints { facets * shadowing * cosine } else { 0.0 };
-        let below = self.below(view);
-        core::array::from_fn(|c| self.diffuse[c] * below[c] * cosine + fresnel[c] * glint)
+        if spread > 0.0 { width * width / (spread * spread) } else { 0.0 }
+    }
+
+    /// How dense mirrored rays are towards `light`, if one is sent: rays for each steradian. `None` if facets are not sampled.
+    pub fn density(&self, incoming: Vec3, normal: Vec3, light: Vec3) -> Option<f32> {
+        if self.width < SMOOTH {
+            return None;
+        }
+        let between = light - incoming;
+        let (square, view) = (between.dot(between), -incoming.dot(normal));
+        if !(square > 0.0 && view > 0.0 && between.dot(normal) > 0.0) {
+            return Some(0.0);
+        }
+        let facets = self.facets(between / libm::sqrtf(square), normal);
+        // The share that is seen over its projection, and what mirroring spreads.
+        Some(facets * core::f32::consts::FRAC_1_PI * 0.5 / (view + reach(self.width, view)))
     }
 
     /// A facet that is seen against `incoming`: its normal, on the side of `normal`.
@@ -110,9 +130,10 @@ impl Glossy {
         out * (view + from) / (out * from + view * to)
     }
 
-    /// Half the angle, radians, that a mirrored ray stands for beside its own.
+    /// Half the angle, radians, that a mirrored ray stands for beside its own: a small part of what facets spread, so that pictures
+    /// in it are blurred by next to nothing more than they are (decision 24 has figures).
     pub fn opening(&self) -> f32 {
-        0.25 * self.width
+        0.0625 * self.width
     }
 }
 
@@ -172,11 +193,44 @@ mod tests {
             for i in 0..rays {
                 let [u, v] = unit_pair(6, i);
                 let light = towards(u, v * core::f32::consts::TAU);
-                lit += f64::from(metal.shown(incoming, Vec3::Z, light, light.z, true)[0]) * 2.0 / f64::from(rays);
+                lit += f64::from(metal.shown(incoming, Vec3::Z, light, light.z, 1.0)[0]) * 2.0 / f64::from(rays);
             }
             assert!((sampled / lit - 1.0).abs() < 0.02, "{rough} {cosine}: {sampled} {lit}");
             assert!(sampled < 1.0);
         }
+    }
+
+    /// Of many facets, as many mirror into each part of the sphere as the density says.
+    #[test]
+    fn facets_are_as_dense_as_they_say() {
+        for (rough, cosine) in [(0.3, 0.9), (0.6, 0.4), (1.0, 0.7)] {
+            let metal = glossy(rough, 1.0, 0.8);
+            let incoming = -towards(cosine, 0.3);
+            let rays = 200_000;
+            // Parts of equal solid angle: four heights (those below the surface too) by eight.
+            let part = |v: Vec3| {
+                let turn = libm::atan2f(v.y, v.x) / core::f32::consts::TAU + 0.5;
+                ((v.z + 1.0) * 4.0).clamp(0.0, 7.0) as usize * 8 + (turn * 8.0).clamp(0.0, 7.0) as usize
+            };
+            let (mut found, mut wanted) = ([0.0f64; 64], [0.0f64; 64]);
+            for i in 0..rays {
+                let facet = metal.facet(incoming, Vec3::Z, unit_pair(5, i));
+                found[part(crate::optics::mirror(incoming, facet))] += 1.0 / f64::from(rays);
+                let [u, v] = unit_pair(6, i);
+                let light = crate::vector::normalize({
+                    let z = 2.0 * u - 1.0;
+                    let (s, c) = libm::sincosf(v * core::f32::consts::TAU);
+                    let across = libm::sqrtf(1.0 - z * z);
+                    Vec3::new(c * across, s * across, z)
+                });
+                let density = metal.density(incoming, Vec3::Z, light).unwrap();
+                wanted[part(light)] += f64::from(density) * 4.0 * core::f64::consts::PI / f64::from(rays);
+            }
+            for (part, (found, wanted)) in found.into_iter().zip(wanted).enumerate() {
+                assert!((found - wanted).abs() < 0.004 + 0.02 * wanted, "{rough} {cosine} {part}: {found} {wanted}");
+            }
+        }
+        assert_eq!(glossy(0.0, 1.0, 0.8).density(-Vec3::Z, Vec3::Z, Vec3::Z), None);
     }
 
     #[test]
@@ -191,7 +245,7 @@ mod tests {
                 .map(|i| {
                     let sample = unit_pair(10, i);
                     let light = towards(sample[0], sample[1] * core::f32::consts::TAU);
-                    let diffuse = 2.0 * any.shown(incoming, Vec3::Z, light, light.z, false)[0];
+                    let diffuse = 2.0 * any.shown(incoming, Vec3::Z, light, light.z, 0.0)[0];
                     let facet = any.facet(incoming, Vec3::Z, sample);
                     let out = crate::optics::mirror(incoming, facet);
                     let share = any.fresnel(-incoming.dot(facet))[0];
@@ -211,7 +265,7 @@ mod tests {
         assert_eq!((mirror.diffuse, mirror.passes(0.6, 0.6)), ([0.0; 3], 1.0));
         let matt = glossy(1.0, 0.0, 0.5);
         let light = towards(0.8, 0.0);
-        let shown = matt.shown(incoming, Vec3::Z, light, 0.8, false)[0];
+        let shown = matt.shown(incoming, Vec3::Z, light, 0.8, 0.0)[0];
         assert!((shown - 0.5 * 0.8 * 0.96).abs() < 0.01, "{shown}");
         assert!((matt.front[0] - 0.04).abs() < 1e-6);
     }

@@ -28,7 +28,7 @@ pub(crate) struct Arrival {
 const JUST_SHORT: f32 = 1.0 - 8.0 / 16_777_216.0;
 
 /// What `light` sends to `point`, by the light's sample `u` (uniform in the unit square; only area lights use it).
-/// `None` if nothing: the point lies behind the light, outside of its cone, or in it.
+/// `None` if nothing: the point lies behind the light, outside of its cone, or in it. What an environment sends, its cells say.
 ///
 /// `distance_scale` is the length of an internal unit in file units. Averaged over `u`, the strength times a surface's
 /// cosine is the irradiance over pi, without bias.
@@ -47,6 +47,7 @@ pub(crate) fn arrival(light: &Light, point: Vec3, distance_scale: f32, u: [f32; 
         }
         LightKind::Rectangle => rectangle(light, point, distance_scale, u),
         LightKind::Sphere => sphere(light, point, distance_scale, u),
+        LightKind::Environment => None,
     }
 }
 

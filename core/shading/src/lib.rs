@@ -11,6 +11,7 @@ extern crate std;
 
 mod camera;
 mod detail;
+mod environment;
 mod filter;
 mod glossy;
 mod highlight;
@@ -28,6 +29,7 @@ mod vector;
 
 pub use camera::{Camera, CameraError, CameraRay, Pose, Projection};
 pub use detail::{Detail, Look, Map, MapTables, Maps, Seen, coverage, seen};
+pub use environment::{Cell, Cut, Environment, Sky, share_of};
 pub use filter::{Filter, sample_offset};
 pub use lens::Lens;
 pub use light::{Light, LightKind};

@@ -1,4 +1,4 @@
-//! Lights: point, directional, spot, sphere and rectangle.
+//! Lights: point, directional, spot, sphere, rectangle, and what is all around.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -17,6 +17,8 @@ pub enum LightKind {
     Sphere = 3,
     /// The rectangle `position + s u + t v`, `s` and `t` in 0..=1, that shines to the side of `u x v`.
     Rectangle = 4,
+    /// The cells of the scene's [`Environment`](crate::Environment), infinitely far.
+    Environment = 5,
 }
 
 /// A light as a node's table holds it.
@@ -45,7 +47,7 @@ pub struct Light {
     pub kind: u32,
     /// Linear colour times strength, see above.
     pub colour: [f32; 3],
-    /// Shadow rays sent to a sphere or rectangle for each hit, at least 1. Ignored by the other kinds.
+    /// Shadow rays sent to a sphere, a rectangle or the environment for each hit, at least 1. Ignored by the other kinds.
     pub samples: u16,
     /// [`Light::FALLOFF`].
     pub flags: u16,
@@ -65,6 +67,7 @@ impl Light {
             2 => LightKind::Spot,
             3 => LightKind::Sphere,
             4 => LightKind::Rectangle,
+            5 => LightKind::Environment,
             _ => LightKind::Point,
         }
     }
@@ -74,7 +77,7 @@ impl Light {
     pub fn shadow_rays(&self) -> u32 {
         match self.kind() {
             LightKind::Point | LightKind::Directional | LightKind::Spot => 1,
-            LightKind::Sphere | LightKind::Rectangle => u32::from(self.samples.max(1)),
+            LightKind::Sphere | LightKind::Rectangle | LightKind::Environment => u32::from(self.samples.max(1)),
         }
     }
 }

@@ -16,7 +16,7 @@
 //! it does.
 //! Source: Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6), 1980.
 //!
-//! A material of metallic-roughness shows what [`glossy`](crate::glossy) says of each light, and one mirrored and one refracted ray,
+//! A material of metallic-roughness shows what GGX facets (docs/SHADING.md) make of each light, and one mirrored and one refracted ray,
 //! both by the same facet, which is drawn by the ray's id. Where only a share of a surface is there, it shows that share of all
 //! this, and the rest of the ray goes straight on.
 
@@ -25,10 +25,11 @@ use core::ops::Range;
 use glam::Vec3;
 
 use crate::detail::{Look, MapTables};
+use crate::environment::{self, share_of};
 use crate::glossy::Glossy;
 use crate::highlight;
 use crate::id;
-use crate::illuminate::arrival;
+use crate::illuminate::{Arrival, arrival};
 use crate::light::{Light, LightKind};
 use crate::material::Material;
 use crate::optics::{self, Boundary};
@@ -87,6 +88,8 @@ pub enum Child {
         weight: [f32; 3],
         /// What it runs through.
         medium: u16,
+        /// How much it shows of what is all around, as [`share_of`] has it.
+        around: u8,
         /// Cursor + 1.
         branch: u32,
     },
@@ -361,11 +364,25 @@ fn shadow(
     let rays = light.shadow_rays();
     let sample = match light.kind() {
         LightKind::Point | LightKind::Directional | LightKind::Spot => [0.5; 2],
-        LightKind::Sphere | LightKind::Rectangle => stratified(id::random(id, first), cursor - first, rays),
+        LightKind::Sphere | LightKind::Rectangle | LightKind::Environment => {
+            stratified(id::random(id, first), cursor - first, rays)
+        }
     };
     let origin = facing.shadow_origin;
-    let Some(found) = arrival(light, origin, scene.distance_scale, sample) else {
-        return Child::None;
+    let around = light.kind() == LightKind::Environment;
+    let environment = &scene.maps.environment;
+    let (found, colour, cell) = if around {
+        let Some((direction, cell)) = environment.arrival(sample) else {
+            return Child::None;
+        };
+        let found = Arrival { path: direction, direction, t_max: f32::INFINITY, strength: 1.0 };
+        let colour = environment.cells[cell].colour;
+        (found, channels(|c| light.colour[c] * colour[c]), cell)
+    } else {
+        let Some(found) = arrival(light, origin, scene.distance_scale, sample) else {
+            return Child::None;
+        };
+        (found, light.colour, 0)
     };
     // Light from behind is shut out here, and spares a ray; but on a lifted point the shading normal alone decides, and
     // the ray finds out: the facets that turn from the light before the smooth surface does are what it was lifted for.
@@ -376,17 +393,37 @@ fn shadow(
     }
     let strength = found.strength / rays as f32;
     let shown = if material.flags & Material::PHYSICAL == 0 {
-        let highlight = highlight::strength(material, facing.incoming, facing.shading, found.direction);
+        // What is around is mirrored as it is, and no highlight stands for it beside.
+        let glints = !(around && material.mirrors());
+        let highlight =
+            if glints { highlight::strength(material, facing.incoming, facing.shading, found.direction) } else { 0.0 };
         channels(|c| material.diffuse[c] * cosine + material.specular[c] * highlight)
     } else {
-        Glossy::new(material).shown(facing.incoming, facing.towards_viewer().0, found.direction, cosine, true)
+        let (glossy, (normal, _)) = (Glossy::new(material), facing.towards_viewer());
+        let glints = if around {
+            let sampled = glossy.density(facing.incoming, normal, found.direction);
+            1.0 - sampled.map_or(1.0, |sampled| share_of(environment::share(sampled, environment.density_of(cell))))
+        } else {
+            1.0
+        };
+        glossy.shown(facing.incoming, normal, found.direction, cosine, glints)
     };
-    let contribution = channels(|c| weight[c] * (light.colour[c] * strength) * shown[c]);
+    let contribution = channels(|c| weight[c] * (colour[c] * strength) * shown[c]);
     // What is not finite goes on: the film counts it.
     if contribution == [0.0; 3] {
         return Child::None;
     }
     Child::Shadow { origin, direction: found.path, t_max: found.t_max, contribution, branch: cursor.saturating_add(1) }
+}
+
+/// How much of what is all around towards `direction` a mirrored ray of this hit shows: see [`environment::share`].
+fn seen_share(scene: &Scene<'_>, glossy: &Glossy, facing: &Facing, direction: Vec3) -> u8 {
+    let environment = &scene.maps.environment;
+    if environment.cells.is_empty() {
+        return 0;
+    }
+    let sampled = glossy.density(facing.incoming, facing.towards_viewer().0, direction);
+    sampled.map_or(0, |sampled| environment::share(sampled, environment.density(direction)))
 }
 
 /// What happens at the boundary of a transmitting material.
@@ -448,6 +485,7 @@ fn mirrored(scene: &Scene<'_>, material: &Material, facing: &Facing, weight: [f3
         direction,
         weight,
         medium: facing.medium,
+        around: 0,
         branch: cursor.saturating_add(1),
     }
 }
@@ -497,6 +535,7 @@ fn glossy_mirrored(
         direction: lift(direction, facing.geometric),
         weight,
         medium: facing.medium,
+        around: seen_share(scene, &glossy, facing, direction),
         branch: cursor.saturating_add(1),
     }
 }

@@ -294,4 +294,4 @@ pub fn from_shared_exponent(packed: u32) -> [f32; 3] {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

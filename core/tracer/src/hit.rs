@@ -54,6 +54,8 @@ pub struct HitRecord {
     pub origin: Origin,
     /// 1 for a primary ray's hit.
     pub depth: u8,
+    /// That of the ray that hit: [`RayRecord::around`].
+    pub around: u8,
 }
 
 const _: () = assert!(size_of::<HitRecord>() <= 160);
@@ -72,6 +74,7 @@ impl HitRecord {
         footprint: 0.0,
         origin: Origin { tile: 0, epoch: 0, home: 0, pixel: 0 },
         depth: 0,
+        around: 0,
     };
 }
 

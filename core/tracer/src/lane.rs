@@ -10,7 +10,7 @@ use hybray_geometry::simd::Kernels;
 use hybray_geometry::{Candidate, Ray, Vec3};
 use hybray_scene::{PageView, Pages, Slot};
 use hybray_shading::spawn::{self, Facing};
-use hybray_shading::{Child, Look, Material, Seen, Surface};
+use hybray_shading::{Child, Look, Material, Seen, Sky, Surface, share_of};
 use hybray_wire::{Counts, RayKind, RayRecord};
 
 /// Where results go.
@@ -171,7 +171,7 @@ impl<'s> Walker<'s> {
 }
 
 /// Surfaces that a ray may pass: transparent ones or holes for a shadow ray, holes for others.
-pub const SHADOW_CHAIN_MAX: u32 = 256;
+pub const SHADOW_CHAIN_MAX: u32 = u8::MAX as u32;
 
 fn flags<P: Pages + ?Sized>(scene: &Scene<'_, P>, material: u16) -> u32 {
     scene.shading.materials.get(usize::from(material)).map_or(0, |material| material.flags)
@@ -319,6 +319,8 @@ pub(crate) struct Spawned {
     /// Times its radiance, if it is a shadow ray.
     pub weight: [f32; 3],
     pub medium: u16,
+    /// As [`RayRecord::around`]; `None` if it shows as much as the ray that hit.
+    pub around: Option<u8>,
     pub branch: u32,
 }
 
@@ -329,28 +331,29 @@ impl Spawned {
         ray: Ray { origin: Vec3::ZERO, direction: Vec3::Z, t_min: 0.0, t_max: 0.0 },
         weight: [0.0; 3],
         medium: 0,
+        around: None,
         branch: 0,
     };
 
     pub(crate) fn of(child: &Child) -> Option<Self> {
-        let (kind, origin, direction, t_max, weight, medium, branch) = match *child {
+        let (kind, origin, direction, t_max, weight, (medium, around), branch) = match *child {
             Child::None => return None,
             Child::Shadow { origin, direction, t_max, contribution, branch } => {
-                (RayKind::Shadow, origin, direction, t_max, contribution, 0, branch)
+                (RayKind::Shadow, origin, direction, t_max, contribution, (0, None), branch)
             }
-            Child::Mirror { origin, direction, weight, medium, branch } => {
-                (RayKind::Mirror, origin, direction, f32::INFINITY, weight, medium, branch)
+            Child::Mirror { origin, direction, weight, medium, around, branch } => {
+                (RayKind::Mirror, origin, direction, f32::INFINITY, weight, (medium, Some(around)), branch)
             }
             Child::Refract { origin, direction, weight, medium, branch } => {
-                (RayKind::Refract, origin, direction, f32::INFINITY, weight, medium, branch)
+                (RayKind::Refract, origin, direction, f32::INFINITY, weight, (medium, None), branch)
             }
         };
-        Some(Self { kind, ray: Ray { origin, direction, t_min: 0.0, t_max }, weight, medium, branch })
+        Some(Self { kind, ray: Ray { origin, direction, t_min: 0.0, t_max }, weight, medium, around, branch })
     }
 
     /// As it travels from a hit.
     pub(crate) fn record<P: Pages + ?Sized>(&self, hit: &HitRecord, scene: &Scene<'_, P>) -> RayRecord {
-        let Self { kind, ray, weight, medium, branch } = *self;
+        let Self { kind, ray, weight, medium, around, branch } = *self;
         let origin = hit.origin;
         let (t_end, medium) = if !scene.has_textures() {
             (ray.t_max, medium)
@@ -377,6 +380,8 @@ impl Spawned {
             medium,
             kind: kind as u8,
             depth: hit.depth + u8::from(kind != RayKind::Shadow),
+            // Shadow rays go straight through glass, with their part of what is behind.
+            around: around.unwrap_or(hit.around),
             ..RayRecord::zeroed()
         }
     }
@@ -399,7 +404,10 @@ pub fn begin<S: Sink, P: Pages + ?Sized>(
     let origin = Origin::of(ray);
     if !hit.candidate.is_hit() {
         let seen: [f32; 3] = match scene.layer {
-            Layer::Light => core::array::from_fn(|c| ray.weight[c] * scene.background[c]),
+            Layer::Light => {
+                let around = around(scene, ray, walks).map_err(|page| wants(ray, hit, page))?;
+                core::array::from_fn(|c| ray.weight[c] * around[c])
+            }
             layer => layer.of_nothing(),
         };
         add(sink, &origin, seen);
@@ -433,7 +441,34 @@ pub fn begin<S: Sink, P: Pages + ?Sized>(
     add(sink, &origin, spawn::local(&scene.shading, &facing, emission, weight));
     let end = spawn::children(&scene.shading, &surface);
     let footprint = if scene.has_textures() { RayRecord::packed_footprint(footprint_at(ray, hit)) } else { 0.0 };
-    Ok(Some(HitRecord { facing, weight, id: ray.id, end, footprint, origin, depth: ray.depth, ..HitRecord::EMPTY }))
+    Ok(Some(HitRecord {
+        facing,
+        weight,
+        id: ray.id,
+        end,
+        footprint,
+        origin,
+        depth: ray.depth,
+        around: ray.around,
+        ..HitRecord::EMPTY
+    }))
+}
+
+/// What a ray sees that hits nothing, or the page of texels that says it and is not at hand.
+fn around<P: Pages + ?Sized>(scene: &Scene<'_, P>, ray: &RayRecord, walks: &mut walk::Counts) -> Result<[f32; 3], u32> {
+    let environment = &scene.shading.maps.environment;
+    let hidden = ray.kind == RayKind::Primary as u8 && environment.sky.flags & Sky::HIDDEN != 0;
+    if !environment.is_there() || hidden {
+        return Ok(scene.background);
+    }
+    let direction = Vec3::from(ray.direction);
+    let [_, spread] = ray.footprint();
+    // What a ray grows by with each unit of its length.
+    let spread = spread / libm::sqrtf(direction.dot(direction));
+    let textures = scene.shading.maps.textures;
+    let seen = environment.radiance(textures, scene.resident.pages, direction, spread, &mut walks.look_ups)?;
+    let share = share_of(ray.around);
+    Ok(seen.map(|c| c * share))
 }
 
 /// What textures say at a hit, if the material has any and the ray does not pass it.

@@ -16,4 +16,4 @@ pub use record::{Partial, RayKind, RayRecord, ShadowRecord};
 pub use tiles::{TILE, Tile, TileMap};
 
 /// Version of everything in this crate: peers with another one are refused.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;

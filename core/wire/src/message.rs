@@ -519,7 +519,7 @@ mod tests {
             assert_eq!(used, 3 + expected.len() + message.body_bytes(), "{message:?}");
         };
         let scene = 0x0123_4567_89ab_cdef;
-        check(Message::Hello { version: 4, scene }, &[0, 4, 0xef, 0x9b, 0xaf, 0xcd, 0xf8, 0xac, 0xd1, 0x91, 1]);
+        check(Message::Hello { version: 5, scene }, &[0, 5, 0xef, 0x9b, 0xaf, 0xcd, 0xf8, 0xac, 0xd1, 0x91, 1]);
         check(Message::Tiles { first: 1172, count: 300, epoch: 0 }, &[2, 0x94, 9, 0xac, 2, 0]);
         check(Message::Rays { rays: 100, shadows: 3, load: 300 }, &[9, 100, 3, 0xac, 2]);
         check(Message::Took { taken: true, load: 0 }, &[10, 1, 0]);

@@ -57,7 +57,10 @@ pub struct RayRecord {
     /// its footprint's width.
     pub medium: u16,
     /// Surfaces that it has passed.
-    pub passed: u16,
+    pub passed: u8,
+    /// How much it shows of what is all around, where it hits nothing: 0 for all of it, else two to the power of minus so many
+    /// eighths. The rest was brought by shadow rays.
+    pub around: u8,
     /// Number of the pixel in its tile, row by row.
     pub pixel: u8,
     /// [`RayKind`] as a number.
@@ -232,7 +235,7 @@ mod tests {
             };
         }
         at!(RayRecord: origin 0, direction 12, t_min 24, t_max 28, id 32, primitive 40, hit_page 44, weight 48, t_end 60,
-            tile 64, page 68, epoch 72, home 74, slot 76, medium 78, passed 80, pixel 82, kind 83, depth 84, settled 85,
+            tile 64, page 68, epoch 72, home 74, slot 76, medium 78, passed 80, around 81, pixel 82, kind 83, depth 84, settled 85,
             moved 86, tries 87);
         at!(ShadowRecord: origin 0, direction 12, t_max 24, home 28, pixel 30, depth 31, id 32, contribution 40, tile 52,
             page 56, epoch 60, moved 62, reserved 63);

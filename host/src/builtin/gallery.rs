@@ -1,13 +1,15 @@
 //! `gallery`: everything that textures, colours and glossy materials do, in one room.
 //!
 //! A tiled floor with normals and roughness of its own, a cloth of holes (cut-out), a pane that is half there, a block of green glass,
-//! balls of rough metal, a sheet whose corners have colours, seen from behind nothing, and a lamp that is seen. The size is the
+//! balls of rough metal, a sheet whose corners have colours, seen from behind nothing, a lamp that is seen, and a sky with a sun
+//! around it all. The size is the
 //! side of the floor's pictures, texels.
 
 use super::noise;
+use crate::import::Surroundings;
 use crate::model::{CameraSpec, Mesh, Model, Settings};
 use crate::texture::{Image, Texture};
-use hybray_shading::{Format, Light, LightKind, Map, Maps, Material, Sampling, Wrap};
+use hybray_shading::{Format, Light, LightKind, Map, Maps, Material, Sampling, Wrap, to_shared_exponent};
 use std::sync::Arc;
 
 const IDENTITY: [f32; 6] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -219,7 +221,20 @@ pub fn gallery(side: u32) -> Model {
             ..Light::default()
         },
     ];
-    model.background = [0.25, 0.3, 0.4];
+    // A sky that is lighter towards the horizon, with a sun behind the visitor's left shoulder, and a dull ground.
+    let sky = Image::from_fn(128, 64, |x, y| {
+        let (turn, down) = ((x as f64 + 0.5) / 128.0, (y as f64 + 0.5) / 64.0);
+        let sun = (turn - 0.62).abs() < 0.01 && (down - 0.25).abs() < 0.02;
+        let haze = 0.5 + down as f32;
+        to_shared_exponent(match (sun, down < 0.5) {
+            (true, _) => [400.0, 360.0, 280.0],
+            (_, true) => [0.25 * haze, 0.3 * haze, 0.4],
+            _ => [0.12, 0.11, 0.1],
+        })
+        .to_le_bytes()
+    });
+    let surroundings = Surroundings { samples: 3, cells: 96, rotation_degrees: 20.0, ..Surroundings::default() };
+    surroundings.give_picture(&mut model, "sky".to_owned(), sky, Format::SharedExponent);
     model.ambient = [0.08; 3];
     model.cameras.push(CameraSpec {
         name: "visitor".to_owned(),

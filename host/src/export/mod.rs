@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 
 use crate::model::{CameraSpec, Mesh, Model};
 use crate::picture::pending::Pending;
+use hybray_shading::Sky;
 
 /// Ray depth that is written where the model's settings give none.
 pub const DEFAULT_DEPTH: u32 = 5;
@@ -27,6 +28,7 @@ pub const DEFAULT_DEPTH: u32 = 5;
 pub fn export(model: &Model, camera: &CameraSpec, path: &Path) -> Result<Vec<String>, ExportError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let mut notes = Notes::default();
+    left_out(model, &mut notes);
     match extension.to_ascii_lowercase().as_str() {
         "nff" => {
             check(model, camera)?;
@@ -84,6 +86,16 @@ fn to_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
         pending.commit()
     };
     run().map_err(|source| ExportError::Write { path: path.to_owned(), source })
+}
+
+/// What of a model none of the formats has.
+fn left_out(model: &Model, notes: &mut Notes) {
+    if model.sky != Sky::EMPTY {
+        notes.add("what is all around is not written", "the scene");
+    }
+    if model.materials.iter().any(|named| named.maps.count() > 0) {
+        notes.add("textures are not written", "the scene");
+    }
 }
 
 /// That everything is finite and every index is in its table, so that writers need not look again.

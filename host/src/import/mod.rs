@@ -4,6 +4,7 @@
 //! file's triangles once (measured: see `tests::ten_million_triangles`), refuses what it cannot read with one line
 //! that names the place, and lists what it cannot honour in [`Model::warnings`].
 
+mod environment;
 mod error;
 mod gltf;
 mod lines;
@@ -25,6 +26,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+pub use environment::{SAMPLES as ENVIRONMENT_SAMPLES, Surroundings};
 pub use error::ImportError;
 pub use validate::{PRIMITIVES_MAX, SIZE_MAX, validate};
 

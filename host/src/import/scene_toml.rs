@@ -7,6 +7,7 @@
 
 mod tables;
 
+use super::environment::Surroundings;
 use super::error::{ImportError, did_you_mean, near, quote};
 use super::meshes::Meshes;
 use super::polygon::Polygons;
@@ -14,7 +15,7 @@ use super::toml_values::{Maybe, Source};
 use super::transform::Transform;
 use super::{Format, MODELS, builtin_model, mtl, open, validate};
 use crate::model::{CameraSpec, Cone, Model, NamedMaterial, Objects, Sphere};
-use hybray_shading::{Highlight, Light, LightKind, Map, Maps, Material, Projection};
+use hybray_shading::{Environment, Highlight, Light, LightKind, Map, Maps, Material, Projection, Sky};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::ops::Range;
@@ -240,6 +241,11 @@ impl<'a> Builder<'a> {
                 self.model.add_use(Map { texture, ..map })
             })
             .collect();
+        if self.model.sky == Sky::EMPTY && other.sky != Sky::EMPTY {
+            let texture = textures.get(other.sky.texture as usize).copied().unwrap_or(Sky::NONE);
+            self.model.sky = Sky { texture, ..other.sky };
+            (self.model.cells, self.model.cuts) = (std::mem::take(&mut other.cells), std::mem::take(&mut other.cuts));
+        }
         for NamedMaterial { name, material, mut maps } in std::mem::take(&mut other.materials) {
             for map in &mut maps.maps {
                 *map = uses.get(usize::from(*map)).copied().unwrap_or(Maps::NONE);
@@ -374,10 +380,47 @@ impl<'a> Builder<'a> {
             self.model.background = self.source.colour_or(&table.colour, "colour", self.model.background)?;
             self.model.ambient = self.source.colour_or(&table.ambient, "ambient", self.model.ambient)?;
         }
+        if let Some(table) = &scene.environment {
+            self.environment(table)?;
+        }
         if let Some(table) = &scene.settings {
             self.settings(table)?;
         }
         Ok(())
+    }
+
+    /// What is all around, in place of what included files say.
+    fn environment(&mut self, table: &Spanned<EnvironmentTable>) -> Result<(), ImportError> {
+        let (span, table) = (table.span(), table.get_ref());
+        let (source, usual) = (&self.source, Surroundings::default());
+        let map = source.needed(&table.map, "map", &span, "\"sky.hdr\"")?;
+        let strength = source.number_or(&table.strength, "strength", 1.0, |s| s >= 0.0, "0 and up, for example 1")?;
+        let degrees = |d: f32| d.abs() <= 36_000.0;
+        let recipe = "-36000 to 36000, for example 90";
+        let up = match &table.up {
+            Some(up) => {
+                let vector = source.numbers(up, "up", "[0, 1, 0]")?.map(f64::from);
+                let missing = || source.error(up.span(), "`up` has no length", "give it as up = [0, 1, 0]");
+                super::unit(vector).ok_or_else(missing)?
+            }
+            None => usual.up,
+        };
+        let whole = |value: &Maybe<i64>, key, most: usize, usual: u16| match value {
+            Some(value) => Ok(source.whole(value, key, i64::from(key == "cells")..most as i64 + 1, "64")? as u16),
+            None => Ok(usual),
+        };
+        let surroundings = Surroundings {
+            colour: source.colour_or(&table.colour, "colour", [1.0; 3])?.map(|c| c * strength),
+            rotation_degrees: source.number_or(&table.rotation, "rotation", 0.0, degrees, recipe)?.into(),
+            up,
+            samples: whole(&table.samples, "samples", u16::MAX.into(), usual.samples)?,
+            cells: whole(&table.cells, "cells", Environment::CELLS_MAX, usual.cells)?,
+            seen: table.seen.as_ref().is_none_or(|seen| *seen.get_ref()),
+        };
+        let path = self.folder.join(map.get_ref());
+        surroundings.give(&mut self.model, &path).map_err(|error| {
+            source.error(map.span(), format!("{}: {}", quote(map.get_ref()), error.problem()), error.remedy())
+        })
     }
 
     fn settings(&mut self, table: &SettingsTable) -> Result<(), ImportError> {

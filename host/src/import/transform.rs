@@ -77,6 +77,7 @@ impl Transform {
             camera.aperture = self.length(camera.aperture);
         }
         model.lights.iter_mut().for_each(|light| self.light(light));
+        model.sky.axes = model.sky.axes.map(|axis| self.unit(axis));
     }
 
     fn light(&self, light: &mut Light) {

@@ -89,6 +89,10 @@ pub fn validate(model: &Model) -> Result<(), ImportError> {
     for (i, l) in model.lights.iter().enumerate() {
         light(l).map_err(|c| fail(format!("light {}", i + 1), c))?;
     }
+    if !model.environment().is_sound(usize::MAX) {
+        let problem = "what is all around makes no sense".to_owned();
+        return Err(fail("the scene".to_owned(), (problem, "give it anew".to_owned())));
+    }
     for c in &model.cameras {
         camera(c).map_err(|e| fail(format!("camera {}", quote(&c.name)), e))?;
     }

@@ -5,12 +5,12 @@ use crate::import::PRIMITIVES_MAX;
 use crate::partition::VOXELS_MAX;
 use bytemuck::{Pod, Zeroable};
 use hybray_scene::{Node, PAGE_BYTES_MAX, PageEntry, lines_for};
-use hybray_shading::{Light, Map, Maps, Material, Texture};
+use hybray_shading::{Cell, Cut, Environment, Light, Map, Maps, Material, Sky, Texture};
 
 /// Bytes that start a file: name, an end of line and an end of text that transfers as text would spoil.
 pub(super) const MAGIC: [u8; 8] = *b"hybray\r\x1a";
 /// Version of the format, the pages' included.
-pub(super) const VERSION: u32 = 2;
+pub(super) const VERSION: u32 = 3;
 /// Most bytes of the postcard tables.
 pub(super) const REST_MAX: u64 = 1 << 20;
 /// Most lights.
@@ -49,8 +49,12 @@ pub(super) struct FileHeader {
     /// Uses of textures.
     pub uses: u32,
     pub textures: u32,
-    /// Zero.
-    pub reserved: [u32; 3],
+    /// 1 if there is something all around, else 0.
+    pub skies: u32,
+    /// Cells of it.
+    pub cells: u32,
+    /// Cuts between them.
+    pub cuts: u32,
 }
 
 const _: () = assert!(size_of::<FileHeader>() == 128);
@@ -67,6 +71,9 @@ pub(super) struct Layout {
     pub maps: u64,
     pub uses: u64,
     pub textures: u64,
+    pub skies: u64,
+    pub cells: u64,
+    pub cuts: u64,
     pub rest: u64,
     /// Bytes of the file.
     pub end: u64,
@@ -83,7 +90,10 @@ impl Layout {
             (self.lights, u64::from(header.lights) * size_of::<Light>() as u64, self.maps),
             (self.maps, u64::from(header.maps) * size_of::<Maps>() as u64, self.uses),
             (self.uses, u64::from(header.uses) * size_of::<Map>() as u64, self.textures),
-            (self.textures, u64::from(header.textures) * size_of::<Texture>() as u64, self.rest),
+            (self.textures, u64::from(header.textures) * size_of::<Texture>() as u64, self.skies),
+            (self.skies, u64::from(header.skies) * size_of::<Sky>() as u64, self.cells),
+            (self.cells, u64::from(header.cells) * size_of::<Cell>() as u64, self.cuts),
+            (self.cuts, u64::from(header.cuts) * size_of::<Cut>() as u64, self.rest),
             (self.rest, header.rest_bytes, self.end),
         ];
         sections.into_iter().map(|(start, bytes, next)| (start + bytes, (next - start - bytes) as usize))
@@ -109,6 +119,9 @@ impl FileHeader {
             maps: next(u64::from(self.maps) * size_of::<Maps>() as u64),
             uses: next(u64::from(self.uses) * size_of::<Map>() as u64),
             textures: next(u64::from(self.textures) * size_of::<Texture>() as u64),
+            skies: next(u64::from(self.skies) * size_of::<Sky>() as u64),
+            cells: next(u64::from(self.cells) * size_of::<Cell>() as u64),
+            cuts: next(u64::from(self.cuts) * size_of::<Cut>() as u64),
             rest: next(self.rest_bytes),
             end: next(0),
         }
@@ -146,6 +159,9 @@ impl FileHeader {
         if self.maps != 0 && self.maps != self.materials {
             return Err("what materials take from textures is neither nothing nor told of each".to_owned());
         }
+        within("skies", self.skies.into(), 1)?;
+        within("cells of the sky", self.cells.into(), u64::from(self.skies) * Environment::CELLS_MAX as u64)?;
+        within("cuts of the sky", self.cuts.into(), 4 * u64::from(self.cells))?;
         within("voxels", self.voxels.into(), VOXELS_MAX.into())?;
         within("bytes of tables", self.rest_bytes, REST_MAX)?;
         for count in self.primitives {
@@ -155,7 +171,7 @@ impl FileHeader {
         if !(-126..=126).contains(&self.scale_log2) {
             return Err(format!("a scale of 2^{}", self.scale_log2));
         }
-        if self.reserved != [0; 3] || self.pages == 0 || self.voxels == 0 {
+        if self.pages == 0 || self.voxels == 0 {
             return Err("its header makes no sense".to_owned());
         }
         if self.layout().end != self.file_bytes {

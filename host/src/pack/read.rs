@@ -10,7 +10,7 @@ use crate::import;
 use crate::model::{Model, NamedMaterial};
 use bytemuck::Pod;
 use hybray_scene::{Directory, Line, PAGE_BYTES_MAX, PageEntry, PageView, Tables, Texels, lines_for, texel_page_bytes};
-use hybray_shading::{Light, Map, MapTables, Maps, Material, Texture};
+use hybray_shading::{Cell, Cut, Environment, Light, Map, MapTables, Maps, Material, Sky, Texture};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -106,6 +106,9 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     let maps: Vec<Maps> = sections.read(layout.maps, header.maps as usize)?;
     let uses: Vec<Map> = sections.read(layout.uses, header.uses as usize)?;
     let textures: Vec<Texture> = sections.read(layout.textures, header.textures as usize)?;
+    let skies: Vec<Sky> = sections.read(layout.skies, header.skies as usize)?;
+    let cells: Vec<Cell> = sections.read(layout.cells, header.cells as usize)?;
+    let cuts: Vec<Cut> = sections.read(layout.cuts, header.cuts as usize)?;
     let rest_bytes: Vec<u8> = sections.read(layout.rest, header.rest_bytes as usize)?;
     let scratch = &mut vec![0; nodes.len() + entries.len()];
     Directory::parse(&nodes, &entries, scratch).map_err(|e| broken(e.to_string()))?;
@@ -113,19 +116,24 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
     let mut index =
         Index { nodes, entries, voxels, voxel_count: header.voxels, primitives: Vec::new(), hash: Index::HASH_START };
     let chunks = read_pages(&mut sections, layout.pages, &mut index, materials.len())?;
-    let tables: [&[u8]; 7] = [
+    let tables: [&[u8]; 10] = [
         bytemuck::cast_slice(&index.voxels),
         bytemuck::cast_slice(&materials),
         bytemuck::cast_slice(&lights),
         bytemuck::cast_slice(&maps),
         bytemuck::cast_slice(&uses),
         bytemuck::cast_slice(&textures),
+        bytemuck::cast_slice(&skies),
+        bytemuck::cast_slice(&cells),
+        bytemuck::cast_slice(&cuts),
         &rest_bytes,
     ];
     if header.sealed(tables.into_iter().fold(index.hash(), hash_bytes)) != header {
         return Err(broken("its bytes are not those that were written (the hash differs)"));
     }
-    let tables = MapTables { maps: &maps, uses: &uses, textures: &textures };
+    let sky = skies.first().copied().unwrap_or_default();
+    let environment = Environment { sky, cells: &cells, cuts: &cuts };
+    let tables = MapTables { maps: &maps, uses: &uses, textures: &textures, environment };
     let geometry = geometry_pages(&index.entries);
     let texels = index.entries.len() as u32 - geometry;
     // Their pages follow one another, each as large as its texture says, until there are none left.
@@ -169,6 +177,9 @@ pub(super) fn read_from(file: impl Read + Seek, length: u64) -> Result<Packing, 
             .collect(),
         uses,
         lights,
+        sky,
+        cells,
+        cuts,
         ..rest.into_model().ok_or_else(|| broken("a camera has a projection that is not known here"))?
     };
     import::validate(&model).map_err(|e| broken(e.to_string()))?;

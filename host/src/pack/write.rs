@@ -8,7 +8,7 @@ use crate::partition::Voxels;
 use crate::picture::pending::Pending;
 use bytemuck::Zeroable;
 use hybray_scene::Line;
-use hybray_shading::{Light, Material, Texture};
+use hybray_shading::{Light, Material, Sky, Texture};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -89,6 +89,7 @@ fn finish(
     let materials: Vec<Material> = about.materials.iter().map(|m| m.material).collect();
     let lights: &[Light] = &about.lights;
     let maps = about.maps();
+    let sky = if about.sky == Sky::EMPTY { &[][..] } else { std::slice::from_ref(&about.sky) };
     let rest = postcard::to_allocvec(&Rest::of(about, extent)).map_err(io::Error::other)?;
     let count = |n: usize| u32::try_from(n).map_err(io::Error::other);
     let mut header = FileHeader {
@@ -103,17 +104,23 @@ fn finish(
         maps: count(maps.len())?,
         uses: count(about.uses.len())?,
         textures: count(textures.len())?,
+        skies: count(sky.len())?,
+        cells: count(about.cells.len())?,
+        cuts: count(about.cuts.len())?,
         voxels: index.voxel_count,
         ..header
     };
     header.file_bytes = header.layout().end;
-    let tables: [&[u8]; 7] = [
+    let tables: [&[u8]; 10] = [
         bytemuck::cast_slice(&index.voxels),
         bytemuck::cast_slice(&materials),
         bytemuck::cast_slice(lights),
         bytemuck::cast_slice(&maps),
         bytemuck::cast_slice(&about.uses),
         bytemuck::cast_slice(textures),
+        bytemuck::cast_slice(sky),
+        bytemuck::cast_slice(&about.cells),
+        bytemuck::cast_slice(&about.cuts),
         &rest,
     ];
     let sections = [bytemuck::cast_slice(&index.nodes), bytemuck::cast_slice(&index.entries)];

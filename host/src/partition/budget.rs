@@ -274,6 +274,7 @@ mod tests {
                 materials: random.below(20) as usize,
                 lights: random.below(20) as usize,
                 maps: [random.below(20) as usize; 3],
+                cells: [random.below(20) as usize; 2],
                 texel_pages_of_a_hit: 2 * random.below(4) as usize,
             };
             let nodes = 1 + random.below(if seed % 2 == 0 { 24 } else { 2 }) as u16;

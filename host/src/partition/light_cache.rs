@@ -114,6 +114,8 @@ impl Sweep {
                 let (u, v) = (Vec3::from(light.u), Vec3::from(light.v));
                 Aabb::around(&[position, position + u, position + v, position + u + v])
             }
+            // From all around: no page lies before others.
+            LightKind::Environment => return Self { from: *from, by: [Vec3::ZERO; 2], end: -1.0 },
             LightKind::Directional => {
                 return Self { from: *from, by: [-Vec3::from(light.axis); 2], end: f32::INFINITY };
             }

@@ -1,6 +1,7 @@
 //! Arguments.
 
 use crate::build::{Rule, Settings};
+use crate::import::ENVIRONMENT_SAMPLES;
 use crate::partition::{PILOT_RAYS, Voxels};
 use crate::picture::PIXELS_PER_DEGREE;
 use anyhow::{Result, bail};
@@ -57,6 +58,24 @@ pub(super) enum Verb {
 pub(super) struct SceneArgs {
     /// A file (.obj, .gltf, .glb, .ply, .nff, .toml, .hyb), or a built-in scene such as `spd:balls:4`: `hybray scenes` lists them
     pub scene: String,
+    /// A picture of what is all around (latitude and longitude; .hdr, .exr): it is seen where rays meet nothing, and lights the scene
+    #[arg(long, value_name = "FILE", help_heading = "Environment")]
+    pub environment: Option<PathBuf>,
+    /// What it is multiplied by
+    #[arg(long, value_name = "F", value_parser = not_negative, default_value_t = 1.0, help_heading = "Environment")]
+    pub environment_strength: f32,
+    /// How far it is turned, counterclockwise seen from above
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        allow_negative_numbers = true,
+        default_value_t = 0.0,
+        help_heading = "Environment"
+    )]
+    pub environment_rotation: f64,
+    /// Shadow rays that each hit sends there; 0 for none: then it is only seen
+    #[arg(long, value_name = "N", default_value_t = ENVIRONMENT_SAMPLES, help_heading = "Environment")]
+    pub environment_samples: u16,
 }
 
 #[derive(Clone, Debug, Args)]

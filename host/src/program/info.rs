@@ -6,6 +6,7 @@ use super::{End, prepare};
 use crate::builtin;
 use anyhow::Result;
 use hybray_scene::PAGE_BYTES_MAX;
+use hybray_shading::Environment;
 use std::io::Write;
 
 pub(super) fn run(args: &InfoArgs) -> Result<End> {
@@ -51,6 +52,16 @@ pub(super) fn run(args: &InfoArgs) -> Result<End> {
             prepared.packed.textures.len(),
             prepared.packed.pages() as u32 - prepared.packed.geometry_pages(),
             prepared.packed.texel_bytes()
+        )?;
+    }
+    let Environment { sky, cells, cuts } = prepared.environment();
+    if let Some(map) = prepared.packed.textures.get(sky.texture as usize) {
+        let (width, height, samples) = (map.width, map.height, sky.samples);
+        let bytes = size_of_val(cells) + size_of_val(cuts);
+        writeln!(
+            out,
+            "environment  {width} x {height} texels; {} cells of {bytes} bytes light, {samples} rays a hit",
+            cells.len()
         )?;
     }
     writeln!(out, "voxels       {}", prepared.packed.voxels())?;

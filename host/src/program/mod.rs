@@ -27,6 +27,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use crate::import::Surroundings;
 use crate::model::{CameraSpec, Model};
 use crate::pack::is_packed;
 use crate::prepare::Prepared;
@@ -120,11 +121,28 @@ fn load(args: &SceneArgs, size: Option<[u32; 2]>) -> Result<(Model, Duration)> {
         bail!("{}: a packed scene keeps pages, not objects; name the scene that it was packed from", args.scene);
     }
     let mut model = import::load(&args.scene)?;
+    surround(&mut model, args)?;
     if size.is_some() {
         model.settings.size = size;
     }
     framing::complete_with_up(&mut model, import::up_axis(&args.scene));
     Ok((model, start.elapsed()))
+}
+
+/// Gives a model what the arguments want to be all around it.
+fn surround(model: &mut Model, args: &SceneArgs) -> Result<()> {
+    let Some(path) = &args.environment else { return Ok(()) };
+    if !args.environment_rotation.is_finite() {
+        bail!("--environment-rotation {}: give degrees", args.environment_rotation);
+    }
+    let surroundings = Surroundings {
+        colour: [args.environment_strength; 3],
+        rotation_degrees: args.environment_rotation,
+        up: import::up_axis(&args.scene).map(f64::from),
+        samples: args.environment_samples,
+        ..Surroundings::default()
+    };
+    Ok(surroundings.give(model, path)?)
 }
 
 /// Reads a scene and builds it, or opens it if it is packed; and how long the reading took. `size` is that of the picture,
@@ -135,6 +153,9 @@ fn prepare(args: &SceneArgs, tree: &TreeArgs, size: Option<[u32; 2]>, page_bytes
         return Ok((Prepared::new(model, &tree.settings_with(page_bytes))?, import_time));
     }
     let start = Instant::now();
+    if args.environment.is_some() {
+        bail!("{}: a packed scene keeps what is around it; pack it with --environment", args.scene);
+    }
     let mut prepared = Prepared::open(Path::new(&args.scene))?;
     if tree.settings() != build::Settings::default() {
         prepared.warnings.push(format!("{} is packed already: settings of the tree are not used", args.scene));

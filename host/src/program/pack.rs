@@ -3,7 +3,7 @@
 use super::args::PackArgs;
 use super::render::interrupts;
 use super::report::{ReportFile, peak_bytes};
-use super::{End, load};
+use super::{End, load, surround};
 use crate::build::BuildError;
 use crate::builtin;
 use crate::model::Model;
@@ -38,7 +38,8 @@ pub(super) fn run(args: &PackArgs) -> Result<End> {
     let path = args.output.clone().unwrap_or_else(|| default_output(scene));
     let json = args.json.as_deref().map(ReportFile::create).transpose()?;
     let (settings, voxels) = (args.tree.settings(), args.tree.voxels);
-    let (about, written) = if let Some((about, objects)) = builtin::streamed(scene) {
+    let (about, written) = if let Some((mut about, objects)) = builtin::streamed(scene) {
+        surround(&mut about, &args.scene)?;
         let written = pack(objects, &about, &settings, voxels, &path, &interrupted);
         (about, written)
     } else {

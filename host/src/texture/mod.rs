@@ -1,8 +1,10 @@
 //! Pictures on surfaces: read, halved level by level, and cut into texel pages.
 
+mod cells;
 mod pages;
 mod read;
 
+pub use cells::cells;
 pub use pages::pages;
 pub use read::{Complaint, HDR_EXTENSIONS, LDR_EXTENSIONS, decode};
 

@@ -10,7 +10,7 @@ const BYTES_MAX: u64 = 1 << 30;
 /// File names of pictures of colours end so.
 pub const LDR_EXTENSIONS: [&str; 6] = ["png", "jpg", "jpeg", "tga", "bmp", "webp"];
 /// Those of light.
-pub const HDR_EXTENSIONS: [&str; 1] = ["hdr"];
+pub const HDR_EXTENSIONS: [&str; 2] = ["hdr", "exr"];
 
 /// Why bytes are no picture.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +19,7 @@ pub enum Complaint {
     #[error("{0}")]
     Broken(#[from] image::ImageError),
     /// A kind that is not known here.
-    #[error("neither PNG, JPEG, TGA, BMP, WebP nor Radiance HDR; convert it to one of them")]
+    #[error("neither PNG, JPEG, TGA, BMP, WebP, Radiance HDR nor OpenEXR; convert it to one of them")]
     Unknown,
     /// Too large, or nothing.
     #[error("{0} x {1} texels; a texture has 1 to 65,535 columns and rows")]
@@ -33,8 +33,15 @@ pub enum Complaint {
 /// See [`Complaint`].
 pub fn decode(bytes: &[u8], extension: Option<&str>) -> Result<(Image, Format), Complaint> {
     let named = extension.and_then(ImageFormat::from_extension);
-    let known =
-        [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Tga, ImageFormat::Bmp, ImageFormat::WebP, ImageFormat::Hdr];
+    let known = [
+        ImageFormat::Png,
+        ImageFormat::Jpeg,
+        ImageFormat::Tga,
+        ImageFormat::Bmp,
+        ImageFormat::WebP,
+        ImageFormat::Hdr,
+        ImageFormat::OpenExr,
+    ];
     let format = image::guess_format(bytes).ok().or(named).filter(|f| known.contains(f)).ok_or(Complaint::Unknown)?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::default();

@@ -67,6 +67,11 @@ impl Picture {
         Self { texture, levels, pages }
     }
 
+    /// A texel of the first level.
+    pub fn texel(&self, x: usize, y: usize) -> [u8; 4] {
+        self.levels[0].2[y * self.levels[0].0 + x]
+    }
+
     /// The value between the four texels around a place, in f64 and from the whole level, with the wrapping of each texel by itself.
     fn expected(&self, uv: [f32; 2], level: usize, wrap: Wrap) -> [f64; 4] {
         let (w, h, texels) = &self.levels[level];

@@ -10,6 +10,7 @@ use toml::Spanned;
 pub(super) struct SceneFile {
     pub(super) settings: Option<SettingsTable>,
     pub(super) background: Option<BackgroundTable>,
+    pub(super) environment: Option<Spanned<EnvironmentTable>>,
     #[serde(default)]
     pub(super) camera: Vec<Spanned<CameraTable>>,
     #[serde(default)]
@@ -51,6 +52,19 @@ pub(super) struct SettingsTable {
 pub(super) struct BackgroundTable {
     pub(super) colour: Maybe<Colour>,
     pub(super) ambient: Maybe<Colour>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EnvironmentTable {
+    pub(super) map: Maybe<String>,
+    pub(super) colour: Maybe<Colour>,
+    pub(super) strength: Maybe<f64>,
+    pub(super) rotation: Maybe<f64>,
+    pub(super) up: Maybe<Vec<f64>>,
+    pub(super) samples: Maybe<i64>,
+    pub(super) cells: Maybe<i64>,
+    pub(super) seen: Maybe<bool>,
 }
 
 #[derive(Deserialize)]

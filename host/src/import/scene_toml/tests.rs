@@ -8,6 +8,8 @@ fn import(text: &str) -> Result<Model, String> {
         ("ball.nff", "b 0.5 0.5 0.5\nv from 0 0 9 at 0 0 0 up 0 1 0 angle 30\nl 1 2 3\nf 1 1 1 1 0 0 0 1\ns 1 0 0 1\n"),
         ("bad.obj", "v 0 0 0\nf 1 2 3\n"),
         ("other.toml", ""),
+        // Two texels of 1/8.
+        ("sky.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n@@@\x7f@@@\x7f"),
     ]);
     let model = read(text, "s.toml", folder.path()).map_err(|e| e.to_string())?;
     assert_eq!(validate::validate(&model), Ok(()));
@@ -100,6 +102,28 @@ fn what_each_material_becomes() {
 }
 
 #[test]
+fn what_is_all_around() {
+    let usual = import("[environment]\nmap = 'sky.hdr'\n").expect("reads");
+    assert_eq!((usual.sky.colour, usual.sky.samples, usual.sky.flags, usual.sky.texture), ([1.0; 3], 16, 0, 0));
+    assert_eq!((usual.cells.len(), usual.textures.len(), usual.lights.len()), (2, 1, 0));
+    assert_eq!(hybray_shading::from_shared_exponent(u32::from_le_bytes(usual.textures[0].image.get(0, 0))), [0.125; 3]);
+    let more = "[environment]\nmap = 'sky.hdr'\nstrength = 2\ncolour = [1, 0.5, 0]\nrotation = 90\nup = [0, 0, 3]\nsamples = 4\ncells = 1\nseen = false\n";
+    let sky = import(more).expect("reads").sky;
+    assert_eq!((sky.colour, sky.samples, sky.flags), ([2.0, 1.0, 0.0], 4, Sky::HIDDEN));
+    assert_eq!(sky.axes, [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let dark = import("[environment]\nmap = 'sky.hdr'\nstrength = 0\n").expect("reads");
+    assert_eq!((dark.sky.samples, dark.cells.len(), dark.cuts.len()), (0, 0, 0));
+    // One gallery inside another has the outer's sky, or brings its own, turned with it.
+    let turned = "[[include]]\nfile = 'gallery:8'\nrotate = { axis = [0, 1, 0], degrees = 70 }\n";
+    let own = import(turned).expect("reads");
+    let [x, _, z] = own.sky.axes[0].map(f64::from);
+    assert!((x - 0.0).abs() < 1e-6 && (z + 1.0).abs() < 1e-6, "20 and 70 degrees: {x} {z}");
+    assert!(own.cells.len() > 2 && own.textures[own.sky.texture as usize].name == "sky");
+    let both = import(&format!("[environment]\nmap = 'sky.hdr'\n{turned}")).expect("reads");
+    assert_eq!((both.sky.axes[0], both.cells.len()), ([1.0, 0.0, 0.0], 2));
+}
+
+#[test]
 fn includes_move_and_bring_their_own() {
     let m = import("[[include]]\nfile = 'ball.nff'\ntranslate = [0, 10, 0]\nscale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }")
         .expect("reads");
@@ -172,6 +196,13 @@ fn mistakes_name_their_line() {
     check("[settings]\nfilter = 'Box'", "2: `filter` is `Box`; give one of \"box\", \"tent\", \"gaussian\"");
     check("[settings]\nexposure = 0", "2: `exposure` is 0");
     check("[settings]\nseed = -1", "2: `seed` is -1");
+    check("[environment]\nsamples = 4", "1: `map` is missing; add map = \"sky.hdr\"");
+    check("[environment]\nmap = 'no.hdr'", "2: `no.hdr`: there is no such file");
+    check("[environment]\nmap = 'two.obj'", "2: `two.obj`: neither PNG");
+    check("[environment]\nmap = 'sky.hdr'\ncells = 0", "3: `cells` is 0; give 1 to 16384");
+    check("[environment]\nmap = 'sky.hdr'\nup = [0, 0, 0]", "3: `up` has no length");
+    check("[environment]\nmap = 'sky.hdr'\nstrength = -1", "3: `strength` is -1; give 0 and up");
+    check("[environment]\nmap = 'sky.hdr'\nrotation = inf", "3: `rotation` is inf");
     check("[background]\ncolour = [1, 2]", "2: `colour` has 2 numbers");
     check("[background]\ncolour = [1, 2, 3, 4]", "2: `colour` has 4 numbers");
     check("[background]\ncolour = '#12345'", "2: `colour` is `#12345`");
