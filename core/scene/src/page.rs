@@ -164,12 +164,8 @@ pub struct PageView<'a> {
     pub spheres: &'a [SphereBlock],
     /// Cones.
     pub cones: &'a [ConeRecord],
-    /// Of each triangle lane; or empty.
-    pub coordinates: &'a [Coordinates],
-    /// Of each triangle lane; or empty.
-    pub colours: &'a [Colours],
-    /// One for all, or one for each slot.
-    pub materials: &'a [u16],
+    /// What stands behind: texture coordinates, colours, materials. Hits ask for them; walks need not know where they are.
+    rest: &'a [u8],
 }
 
 impl<'a> PageView<'a> {
@@ -253,7 +249,7 @@ impl<'a> PageView<'a> {
                 return Err(PageError::Vertex { block });
             }
         }
-        if let Some(&material) = view.materials.iter().find(|&&m| usize::from(m) >= tables.materials) {
+        if let Some(&material) = view.materials().iter().find(|&&m| usize::from(m) >= tables.materials) {
             return Err(PageError::Material(material));
         }
         Ok(view)
@@ -302,21 +298,40 @@ impl<'a> PageView<'a> {
                 (Body::Compact(compact), spheres, cones)
             }
         };
-        Self {
-            header,
-            body,
-            spheres: bytemuck::cast_slice(spheres),
-            cones: bytemuck::cast_slice(cones),
-            coordinates: bytemuck::cast_slice(take(header.lanes_with(Header::COORDINATES), size_of::<Coordinates>())),
-            colours: bytemuck::cast_slice(take(header.lanes_with(Header::COLOURS), size_of::<Colours>())),
-            materials: bytemuck::cast_slice(take(header.materials, 2)),
-        }
+        Self { header, body, spheres: bytemuck::cast_slice(spheres), cones: bytemuck::cast_slice(cones), rest }
+    }
+
+    /// Bytes of texture coordinates and of colours.
+    fn attribute_bytes(&self) -> [usize; 2] {
+        let lanes = |attribute| self.header.lanes_with(attribute) as usize;
+        [lanes(Header::COORDINATES) * size_of::<Coordinates>(), lanes(Header::COLOURS) * size_of::<Colours>()]
+    }
+
+    /// Texture coordinates of each triangle lane; or empty.
+    #[must_use]
+    pub fn coordinates(&self) -> &'a [Coordinates] {
+        bytemuck::cast_slice(&self.rest[..self.attribute_bytes()[0]])
+    }
+
+    /// Colours of each triangle lane; or empty.
+    #[must_use]
+    pub fn colours(&self) -> &'a [Colours] {
+        let [before, bytes] = self.attribute_bytes();
+        bytemuck::cast_slice(&self.rest[before..][..bytes])
+    }
+
+    /// One for all, or one for each slot.
+    #[must_use]
+    pub fn materials(&self) -> &'a [u16] {
+        let before = if self.header.attributes == 0 { 0 } else { self.attribute_bytes().iter().sum() };
+        bytemuck::cast_slice(&self.rest[before..][..2 * self.header.materials as usize])
     }
 
     /// The material of the primitive in `slot`.
     #[must_use]
     pub fn material(&self, slot: Slot) -> u16 {
-        if let [one] = self.materials {
+        let materials = self.materials();
+        if let [one] = materials {
             return *one;
         }
         let before = match slot.kind() {
@@ -324,7 +339,7 @@ impl<'a> PageView<'a> {
             Kind::Sphere => self.body.triangle_lanes(),
             Kind::Cone => self.body.triangle_lanes() + self.spheres.len() * BLOCK,
         };
-        self.materials[before + slot.number()]
+        materials[before + slot.number()]
     }
 }
 

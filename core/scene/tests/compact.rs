@@ -98,7 +98,7 @@ fn a_page_is_read_where_it_lies() {
     assert_eq!((body.nodes, body.triangles), (&parts.nodes[..], &parts.triangles[..]));
     assert_eq!((body.vertices, body.normals), (&parts.vertices[..], &parts.normals[..]));
     assert_eq!((page.spheres, page.cones), (&parts.spheres[..], &parts.cones[..]));
-    assert_eq!(page.materials, &parts.materials[..]);
+    assert_eq!(page.materials(), &parts.materials[..]);
     assert_eq!(page.header.bytes, 64 + 80 + 80 + 2 * 40 + 3 * 36 + 5 * 12 + 5 * 4 + 15 * 2);
     assert_eq!(body.nodes.as_ptr().cast::<u8>(), lines[1].0.as_ptr(), "in place");
     let of = |kind, number| page.material(Slot::new(kind, number));

@@ -44,7 +44,7 @@ fn a_page_is_read_where_it_lies() {
         (&parts.nodes[..], &parts.triangles[..], &parts.spheres[..])
     );
     assert_eq!(
-        (page.cones, body.normals, page.materials),
+        (page.cones, body.normals, page.materials()),
         (&parts.cones[..], &parts.normals[..], &parts.materials[..])
     );
     assert_eq!(page.header.bytes as usize, HEADER_BYTES + 224 + 2 * 160 + 80 + 3 * 36 + 8 * 12 + 15 * 2);

@@ -51,6 +51,15 @@ impl Step {
         if steps >= GREATEST as f64 { Fixed::Clamped(GREATEST) } else { Fixed::Whole(steps as u64) }
     }
 
+    /// All channels, if [`Step::fix`] takes each whole: nearly always, and in fewer branches.
+    #[must_use]
+    #[inline]
+    pub fn fix_whole(&self, radiance: [f32; 3]) -> Option<[u64; 3]> {
+        let steps = radiance.map(|c| f64::from(c) * self.scale + 0.5);
+        let whole = radiance.iter().all(|&c| c >= 0.0) && steps.iter().all(|&s| s < GREATEST as f64);
+        whole.then(|| steps.map(|s| s as i64 as u64))
+    }
+
     /// Radiance of a sum of `samples` samples.
     #[must_use]
     pub fn mean(&self, sum: u64, samples: u16) -> f32 {
@@ -273,6 +282,15 @@ mod tests {
             assert_eq!(step.fix(refused), Fixed::Refused);
         }
         assert_eq!(step.mean(3 << 32, 2), 1.5);
+        // Three at once are what each is.
+        let odd = [0.0, -0.0, 1.0, 1e-10, 3e-10, 16_777_215.0, 16_777_216.0, f32::MAX, -1e-30, f32::NAN, f32::INFINITY];
+        for c in
+            (0..odd.len().pow(3)).map(|i| [i, i / odd.len(), i / odd.len() / odd.len()].map(|i| odd[i % odd.len()]))
+        {
+            let each = c.map(|c| step.fix(c));
+            let whole = each.iter().all(|fixed| matches!(fixed, Fixed::Whole(_)));
+            assert_eq!(step.fix_whole(c).map(|steps| steps.map(Fixed::Whole)), whole.then_some(each), "{c:?}");
+        }
     }
 
     #[test]

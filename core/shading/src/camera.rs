@@ -273,11 +273,18 @@ impl Camera {
         let pixel_id = id::pixel_id(seed, y.wrapping_mul(self.width).wrapping_add(x));
         let offset = sample_offset(filter, pixel_id, sample, spp);
         if self.lens.radius > 0.0 {
-            let turn = permuted(sample, spp, id::child_id(pixel_id, 1));
-            let u = stratified(id::child_id(pixel_id, 0), turn, spp);
-            return self.ray_through(self.place(x, y, offset), self.lens.point(u));
+            self.through_lens([x, y], offset, pixel_id, sample, spp)
+        } else {
+            self.ray(x, y, offset)
         }
-        self.ray(x, y, offset)
+    }
+
+    /// The sample's ray through its point of the lens.
+    #[inline(never)]
+    fn through_lens(&self, [x, y]: [u32; 2], offset: [f32; 2], pixel_id: u64, sample: u32, spp: u32) -> CameraRay {
+        let turn = permuted(sample, spp, id::child_id(pixel_id, 1));
+        let u = stratified(id::child_id(pixel_id, 0), turn, spp);
+        self.ray_through(self.place(x, y, offset), self.lens.point(u))
     }
 
     /// The ray through a pixel, and the middle of the lens. `offset` is in pixels from the pixel's centre: right, and down.
@@ -374,6 +381,7 @@ impl Camera {
     }
 
     /// Forward, from so far right and up of the eye.
+    #[inline(never)]
     fn parallel(&self, [across, above]: [f32; 2]) -> CameraRay {
         let (right, up, forward) = self.axes();
         CameraRay {
@@ -386,6 +394,7 @@ impl Camera {
     }
 
     /// Towards a longitude, right of forward, and a latitude, radians. Beyond a pole it comes down on the other side.
+    #[inline(never)]
     fn around(&self, [longitude, latitude]: [f32; 2]) -> CameraRay {
         let (right, up, forward) = self.axes();
         let (sine, cosine) = libm::sincosf(latitude);

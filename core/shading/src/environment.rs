@@ -115,7 +115,7 @@ pub(crate) fn share(sampled: f32, lit: f32) -> u8 {
     }
 }
 
-/// What [`share`] stands for.
+/// What a share, an eighth of a power of two, stands for: 0 for all.
 #[must_use]
 pub fn share_of(eighths: u8) -> f32 {
     if eighths == 0 { 1.0 } else { libm::exp2f(f32::from(eighths) * -0.125) }

@@ -416,7 +416,7 @@ fn shadow(
     Child::Shadow { origin, direction: found.path, t_max: found.t_max, contribution, branch: cursor.saturating_add(1) }
 }
 
-/// How much of what is all around towards `direction` a mirrored ray of this hit shows: see [`environment::share`].
+/// How much of what is all around towards `direction` a mirrored ray of this hit shows: see `environment::share`.
 fn seen_share(scene: &Scene<'_>, glossy: &Glossy, facing: &Facing, direction: Vec3) -> u8 {
     let environment = &scene.maps.environment;
     if environment.cells.is_empty() {

@@ -192,10 +192,10 @@ pub(crate) fn detail(page: &PageView<'_>, ray: &RayRecord, hit: &Hit, surface: &
     }
     let number = hit.slot.number();
     let shares = [1.0 - uv[0] - uv[1], uv[0], uv[1]];
-    if let Some(corners) = page.colours.get(number) {
+    if let Some(corners) = page.colours().get(number) {
         detail.colour = Detail::colour(corners, shares);
     }
-    if let Some(&[a, b, c]) = page.coordinates.get(number) {
+    if let Some(&[a, b, c]) = page.coordinates().get(number) {
         let [p, q, r] = page.body.triangle(number).v;
         let (first, second) = (q - p, r - p);
         let ([b_u, b_v], [c_u, c_v]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);

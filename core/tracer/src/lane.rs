@@ -319,8 +319,8 @@ pub(crate) struct Spawned {
     /// Times its radiance, if it is a shadow ray.
     pub weight: [f32; 3],
     pub medium: u16,
-    /// As [`RayRecord::around`]; `None` if it shows as much as the ray that hit.
-    pub around: Option<u8>,
+    /// As [`RayRecord::around`], of a mirrored ray; others show as much as the ray that hit.
+    pub around: u8,
     pub branch: u32,
 }
 
@@ -331,7 +331,7 @@ impl Spawned {
         ray: Ray { origin: Vec3::ZERO, direction: Vec3::Z, t_min: 0.0, t_max: 0.0 },
         weight: [0.0; 3],
         medium: 0,
-        around: None,
+        around: 0,
         branch: 0,
     };
 
@@ -339,13 +339,13 @@ impl Spawned {
         let (kind, origin, direction, t_max, weight, (medium, around), branch) = match *child {
             Child::None => return None,
             Child::Shadow { origin, direction, t_max, contribution, branch } => {
-                (RayKind::Shadow, origin, direction, t_max, contribution, (0, None), branch)
+                (RayKind::Shadow, origin, direction, t_max, contribution, (0, 0), branch)
             }
             Child::Mirror { origin, direction, weight, medium, around, branch } => {
-                (RayKind::Mirror, origin, direction, f32::INFINITY, weight, (medium, Some(around)), branch)
+                (RayKind::Mirror, origin, direction, f32::INFINITY, weight, (medium, around), branch)
             }
             Child::Refract { origin, direction, weight, medium, branch } => {
-                (RayKind::Refract, origin, direction, f32::INFINITY, weight, (medium, None), branch)
+                (RayKind::Refract, origin, direction, f32::INFINITY, weight, (medium, 0), branch)
             }
         };
         Some(Self { kind, ray: Ray { origin, direction, t_min: 0.0, t_max }, weight, medium, around, branch })
@@ -381,7 +381,7 @@ impl Spawned {
             kind: kind as u8,
             depth: hit.depth + u8::from(kind != RayKind::Shadow),
             // Shadow rays go straight through glass, with their part of what is behind.
-            around: around.unwrap_or(hit.around),
+            around: if kind == RayKind::Mirror { around } else { hit.around },
             ..RayRecord::zeroed()
         }
     }

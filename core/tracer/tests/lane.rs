@@ -154,7 +154,7 @@ fn breadth_first(scene: &Scene<'_>, primary: &RayRecord) -> Vec<[u32; 3]> {
                         add(arriving_by_hand(scene, &Ray { origin, direction, t_min: 0.0, t_max }, contribution));
                         continue;
                     }
-                    spawn::Child::Mirror { origin, direction, weight, medium, branch } => {
+                    spawn::Child::Mirror { origin, direction, weight, medium, branch, .. } => {
                         (origin, direction, weight, medium, branch, RayKind::Mirror)
                     }
                     spawn::Child::Refract { origin, direction, weight, medium, branch } => {

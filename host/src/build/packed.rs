@@ -290,8 +290,8 @@ impl<'a> Pages<'a> {
             let mut add = |kind: Kind, number: usize, id: u32, shape: &[f32], normals: &[u32]| {
                 if is_new(id) {
                     let of_triangle = kind == Kind::Triangle;
-                    let coordinates = page.coordinates.get(number).filter(|_| of_triangle);
-                    let colours = page.colours.get(number).filter(|_| of_triangle);
+                    let coordinates = page.coordinates().get(number).filter(|_| of_triangle);
+                    let colours = page.colours().get(number).filter(|_| of_triangle);
                     let about = [id, kind as u32, page.material(Slot::new(kind, number)).into()];
                     let parts: [&[u8]; 3] =
                         [bytemuck::cast_slice(&about), bytemuck::cast_slice(shape), bytemuck::cast_slice(normals)];

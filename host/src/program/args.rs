@@ -62,7 +62,7 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "FILE", help_heading = "Environment")]
     pub environment: Option<PathBuf>,
     /// What it is multiplied by
-    #[arg(long, value_name = "F", value_parser = not_negative, default_value_t = 1.0, help_heading = "Environment")]
+    #[arg(long, value_name = "F", allow_negative_numbers = true, value_parser = not_negative, default_value_t = 1.0, help_heading = "Environment")]
     pub environment_strength: f32,
     /// How far it is turned, counterclockwise seen from above
     #[arg(

@@ -113,11 +113,11 @@ impl Sums {
     /// In two, where least is moved.
     fn cut(&self, part: &Part) -> Option<[Part; 2]> {
         let Part { columns, rows } = part;
-        let by_column = (columns.start + 1..columns.end).map(|at| {
+        let mut by_column = (columns.start + 1..columns.end).map(|at| {
             let part = |columns| Part { columns, rows: rows.clone() };
             [part(columns.start..at), part(at..columns.end)]
         });
-        let by_row = (rows.start + 1..rows.end).map(|at| {
+        let mut by_row = (rows.start + 1..rows.end).map(|at| {
             let part = |rows| Part { columns: columns.clone(), rows };
             [part(rows.start..at), part(at..rows.end)]
         });
@@ -126,9 +126,9 @@ impl Sums {
             // In the middle.
             let halves = |range: &Range<usize>| range.len() / 2;
             return if across >= down && columns.len() > 1 || rows.len() == 1 {
-                by_column.skip(halves(columns).max(1) - 1).next()
+                by_column.nth(halves(columns).max(1) - 1)
             } else {
-                by_row.skip(halves(rows).max(1) - 1).next()
+                by_row.nth(halves(rows).max(1) - 1)
             };
         }
         let cost = |two: &[Part; 2]| self.moved(&two[0]) + self.moved(&two[1]);

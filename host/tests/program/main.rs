@@ -3,6 +3,7 @@
 mod budget;
 mod convert;
 mod ends;
+mod environment;
 mod errors;
 mod pack;
 mod pictures;

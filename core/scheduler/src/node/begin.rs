@@ -55,6 +55,7 @@ pub(super) fn trace_bundle<P: Pages + ?Sized>(
     wide::nearest(kernels, &scene.resident, rays, walked, scratch, walker.stack, &mut walker.counts);
 }
 
+#[inline]
 /// `textured` says whether it tells how much it stands for: a pixel's part of its samples, so that the samples together see what
 /// the pixel does.
 pub(super) fn primary(

@@ -161,6 +161,10 @@ impl Sums<'_, '_> {
 impl Sink for Sums<'_, '_> {
     fn contribute(&mut self, origin: &Origin, radiance: [f32; 3]) {
         self.counts.contributions += 1;
+        if let Some(sums) = self.step.fix_whole(radiance) {
+            self.add(origin, sums, 0);
+            return;
+        }
         let fixed = radiance.map(|c| self.step.fix(c));
         if fixed.contains(&Fixed::Refused) {
             self.counts.refused += 1;
